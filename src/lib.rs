@@ -1,0 +1,3 @@
+//! Sunfleck: a headless, physically based path tracer on Vulkan compute.
+
+pub mod scene;

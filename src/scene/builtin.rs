@@ -1,0 +1,1 @@
+//! Scenes that are part of the binary.
