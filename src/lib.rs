@@ -1,3 +1,8 @@
 //! Sunfleck: a headless, physically based path tracer on Vulkan compute.
 
+pub mod error;
+pub mod film;
+pub mod render;
 pub mod scene;
+
+pub use error::{Error, Result};
