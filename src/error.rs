@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::gpu::GpuError;
+use crate::prepare::PrepareError;
 use crate::scene::SceneError;
 
 /// An error of the library. [`Error::exit_code`] is what the command line makes of it.
@@ -22,6 +24,9 @@ pub enum Error {
         /// What is wrong with it and what to do.
         message: String,
     },
+    /// A scene that is well formed but does not fit the renderer's limits.
+    #[error("the scene cannot be prepared: {0}")]
+    Prepare(#[from] PrepareError),
     /// The file system refused. An output that cannot be written is of this kind.
     #[error("{}: cannot {action}", path.display())]
     Io {
@@ -46,6 +51,18 @@ pub enum Error {
     Interrupted,
 }
 
+impl From<GpuError> for Error {
+    fn from(error: GpuError) -> Self {
+        match error {
+            GpuError::NoDriver(_) | GpuError::NoDevice(_) | GpuError::Lacks { .. } => Self::Device(error.to_string()),
+            GpuError::OutOfMemory { .. } | GpuError::DeviceLost { .. } | GpuError::Vulkan { .. } => {
+                Self::DeviceLost(error.to_string())
+            }
+            GpuError::Shader(_) => Self::Usage(error.to_string()),
+        }
+    }
+}
+
 /// Result of the library's fallible functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -66,7 +83,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
-            Self::Scene(_) | Self::Input { .. } | Self::Io { .. } => 3,
+            Self::Scene(_) | Self::Prepare(_) | Self::Input { .. } | Self::Io { .. } => 3,
             Self::Device(_) => 4,
             Self::DeviceLost(_) => 5,
             Self::Untrustworthy(_) => 6,

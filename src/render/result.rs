@@ -15,6 +15,8 @@ pub struct RenderResult {
     pub device: String,
     /// Name and version of its driver.
     pub driver: String,
+    /// Why this device and this way to trace.
+    pub device_reason: String,
     /// How rays were traced: `ray-query` or `bvh`.
     pub trace: String,
     /// The kernel key: equal keys compute equal bits on one device and driver.
