@@ -42,7 +42,7 @@ impl Loader<'_> {
             ..Material::default()
         };
         if let Some(unlit) = place.extension("KHR_materials_unlit")? {
-            unlit.keys()?;
+            let _ = unlit.keys()?;
             material.bsdf = Bsdf::Unlit;
         }
         read_extras(place, &mut material)?;
