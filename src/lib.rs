@@ -4,6 +4,7 @@ pub mod error;
 pub mod film;
 pub mod gpu;
 pub mod layout;
+pub mod prepare;
 pub mod render;
 pub mod scene;
 

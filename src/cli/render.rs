@@ -9,7 +9,7 @@ use sunfleck::film::exr::ExrImage;
 use sunfleck::film::metadata::{Metadata, REC709_CHROMATICITIES, software};
 use sunfleck::film::output::ImageFormat;
 use sunfleck::film::png::{tone_map_srgb8, write_png};
-use sunfleck::render::{ProgressUpdate, RenderResult, Settings, StopReason};
+use sunfleck::render::{RenderResult, Settings, StopReason};
 use sunfleck::scene::{Environment, Scene, load};
 
 use super::progress::Progress;
@@ -22,7 +22,7 @@ pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
     let scene = load_scene(&job)?;
     interrupt::install();
     let mut progress = Progress::new(job.quiet);
-    let result = render(&scene, &job.settings, &mut |update| {
+    let result = sunfleck::render::render(&scene, &job.settings, &mut |update| {
         progress.show(update);
         if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -39,15 +39,6 @@ pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
         print_json(&report(&job, &result))?;
     }
     verdict(&job.settings, &result)
-}
-
-/// The one call into the renderer.
-fn render(
-    _scene: &Scene,
-    _settings: &Settings,
-    _progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
-) -> sunfleck::Result<RenderResult> {
-    Err(Error::Usage(format!("rendering is not built yet in {}", software())))
 }
 
 /// The scene with the environment that the flags ask for, with a camera and with light.

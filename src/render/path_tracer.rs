@@ -15,7 +15,7 @@ use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
     shader_compiler,
 };
-use crate::layout::{BLOCK_SAMPLES, BlockResult, LANE_STATE_BYTES, RenderConstants, SliceConstants};
+use crate::layout::{BLOCK_SAMPLES, BlockResult, RenderConstants, SliceConstants};
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
