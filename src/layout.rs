@@ -1,0 +1,385 @@
+//! Every struct and constant that a shader reads or writes. The other half is `shaders/include/layout.glsl`;
+//! `tests/layout.rs` holds the two together.
+//!
+//! Scene data lies in a few arrays of 16-byte texels, which the shader reads through one accessor (`load4(array, index)`,
+//! see `shaders/include/arrays.glsl`) as texel buffer, storage buffer or device address. A struct here is a whole number
+//! of texels.
+
+use bytemuck::{Pod, Zeroable};
+
+/// "No index": no texture, no light, no hit.
+pub const NONE: u32 = u32::MAX;
+
+/// One 16-byte element of a scene array.
+pub type Texel = [u32; 4];
+
+/// The scene arrays, in binding order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum SceneArray {
+    /// BVH slots: [`InnerSlot`], [`LeafSlot`], [`InstanceSlot`].
+    Slots = 0,
+    /// [`Triangle`] records, then [`Vertex`] records.
+    Attributes = 1,
+    /// Small tables: materials, texture headers, lights, the light CDF, instances.
+    Tables = 2,
+    /// Texels of all images, packed words.
+    Texels = 3,
+    /// Environment radiance, its marginal and its conditional CDFs.
+    Environment = 4,
+}
+
+/// Number of [`SceneArray`]s.
+pub const SCENE_ARRAYS: usize = 5;
+/// An array larger than a device's limit is split into at most this many chunks.
+pub const MAX_CHUNKS: usize = 4;
+
+/// Bit of `kind` that marks a triangle.
+pub const SLOT_LEAF: u32 = 1 << 31;
+/// Bit of `kind` that marks an instance.
+pub const SLOT_INSTANCE: u32 = 1 << 30;
+/// Bits of a leaf's `kind` that hold the material index.
+pub const SLOT_MATERIAL_MASK: u32 = (1 << 24) - 1;
+/// Slots stand in groups of this many: the children of one inner slot.
+pub const SLOT_GROUP: u32 = 4;
+
+/// An inner node of the four-wide BVH, with its children's boxes quantised to 8 bits on a grid of its own.
+/// Box k spans, on each axis, `origin + lower.k · 2^(e−127)` to `origin + upper.k · 2^(e−127)`, with child k's 8 bits at
+/// bit 8k. An absent child has lower 255 and upper 0, and its slot is an all-zero triangle.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct InnerSlot {
+    /// Origin of the grid.
+    pub origin: [f32; 3],
+    /// Biased exponents of the grid's steps: x at bit 0, y at bit 8, z at bit 16.
+    pub exponents: u32,
+    /// Lower bounds, one word an axis.
+    pub lower: [u32; 3],
+    /// Upper bounds, one word an axis.
+    pub upper: [u32; 3],
+    /// The children are slots `4·child_group` to `4·child_group + 3`.
+    pub child_group: u32,
+    /// 0.
+    pub kind: u32,
+}
+
+/// A triangle, three vertices as they are (so that neighbours test a shared edge alike).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct LeafSlot {
+    /// Vertices, counter-clockwise seen from the front.
+    pub vertices: [[f32; 3]; 3],
+    /// Index of the [`Triangle`] record.
+    pub triangle: u32,
+    /// Index of the light it is ([`NONE`] if it does not emit); in an instanced mesh, relative to the instance's first light.
+    pub light: u32,
+    /// [`SLOT_LEAF`] | material index.
+    pub kind: u32,
+}
+
+/// A placed mesh: traversal goes on at the instance's root with the ray in object space.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct InstanceSlot {
+    /// Unused, zero.
+    pub unused: [u32; 9],
+    /// Index of the [`InstanceRecord`].
+    pub instance: u32,
+    /// Unused, zero.
+    pub unused_too: u32,
+    /// [`SLOT_INSTANCE`].
+    pub kind: u32,
+}
+
+/// Texels a slot takes.
+pub const SLOT_TEXELS: u32 = 3;
+
+/// The triangle's vertices carry normals.
+pub const TRIANGLE_NORMALS: u32 = 1;
+/// The triangle's vertices carry texture coordinates.
+pub const TRIANGLE_TEXCOORDS: u32 = 2;
+
+/// What shading needs of a triangle beyond its positions.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Triangle {
+    /// Indices of [`Vertex`] records.
+    pub vertices: [u32; 3],
+    /// [`TRIANGLE_NORMALS`], [`TRIANGLE_TEXCOORDS`].
+    pub flags: u32,
+}
+
+/// Shading attributes of a vertex, in the space of its mesh (world for baked meshes).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Vertex {
+    /// Unit shading normal.
+    pub normal: [f32; 3],
+    /// Texture coordinate u.
+    pub u: f32,
+    /// Texture coordinate v.
+    pub v: f32,
+    /// Unused, zero.
+    pub unused: [f32; 3],
+}
+
+/// Texels a vertex takes.
+pub const VERTEX_TEXELS: u32 = 2;
+
+/// [`Material`] `kind`: Lambertian.
+pub const BSDF_LAMBERTIAN: u32 = 0;
+/// [`Material`] `kind`: mirror.
+pub const BSDF_MIRROR: u32 = 1;
+/// [`Material`] `kind`: refract.
+pub const BSDF_REFRACT: u32 = 2;
+/// [`Material`] `kind`: glass.
+pub const BSDF_GLASS: u32 = 3;
+/// [`Material`] `kind`: metallic-roughness.
+pub const BSDF_METALLIC_ROUGHNESS: u32 = 4;
+/// [`Material`] `kind`: unlit.
+pub const BSDF_UNLIT: u32 = 5;
+/// Bits of `kind_flags` that hold the BSDF.
+pub const MATERIAL_KIND_MASK: u32 = 0xff;
+/// `kind_flags`: emits from both sides.
+pub const MATERIAL_DOUBLE_SIDED: u32 = 1 << 8;
+/// `kind_flags`: the back neither scatters nor emits.
+pub const MATERIAL_BLACK_BACK: u32 = 1 << 9;
+/// `kind_flags`: glass with Schlick's Fresnel term.
+pub const MATERIAL_SCHLICK: u32 = 1 << 10;
+
+/// A material's parameters; see `scene::Material`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Material {
+    /// Linear colour.
+    pub base_color: [f32; 3],
+    /// One of `BSDF_*` and `MATERIAL_*` flags.
+    pub kind_flags: u32,
+    /// Radiance.
+    pub emission: [f32; 3],
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Metalness.
+    pub metallic: f32,
+    /// Index of refraction.
+    pub ior: f32,
+    /// Thin-walled transmission.
+    pub transmission: f32,
+    /// Texture index or [`NONE`].
+    pub base_color_texture: u32,
+    /// Texture index or [`NONE`].
+    pub metallic_roughness_texture: u32,
+    /// Texture index or [`NONE`].
+    pub emission_texture: u32,
+    /// Unused, zero.
+    pub unused: [u32; 2],
+}
+
+/// Texels a material takes.
+pub const MATERIAL_TEXELS: u32 = 4;
+
+/// `sampling`: texels are sRGB-encoded (alpha never is).
+pub const TEXTURE_SRGB: u32 = 1;
+/// `sampling`: 16 bits a channel (two words a texel, R | G << 16 first) instead of 8 (R | G << 8 | B << 16 | A << 24).
+pub const TEXTURE_16_BIT: u32 = 2;
+/// `sampling`: nearest texel instead of bilinear.
+pub const TEXTURE_NEAREST: u32 = 4;
+/// `sampling`: shift of the wrap mode along u; 0 repeat, 1 mirrored repeat, 2 clamp to edge.
+pub const TEXTURE_WRAP_U_SHIFT: u32 = 4;
+/// `sampling`: shift of the wrap mode along v.
+pub const TEXTURE_WRAP_V_SHIFT: u32 = 6;
+
+/// Where a texture's texels are and how they are read.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TextureHeader {
+    /// First word in [`SceneArray::Texels`].
+    pub first_word: u32,
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// `TEXTURE_*` bits.
+    pub sampling: u32,
+}
+
+/// [`Light`] `kind`: emissive triangle.
+pub const LIGHT_TRIANGLE: u32 = 0;
+/// [`Light`] `kind`: point.
+pub const LIGHT_POINT: u32 = 1;
+/// [`Light`] `kind`: spot.
+pub const LIGHT_SPOT: u32 = 2;
+/// [`Light`] `kind`: directional.
+pub const LIGHT_DIRECTIONAL: u32 = 3;
+/// [`Light`] `kind`: the environment.
+pub const LIGHT_ENVIRONMENT: u32 = 4;
+
+/// A light that can be sampled. Lights are picked by the CDF at `light_cdf_word`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Light {
+    /// Position (point, spot).
+    pub position: [f32; 3],
+    /// One of `LIGHT_*`.
+    pub kind: u32,
+    /// Radiant intensity or, for a directional light, irradiance.
+    pub intensity: [f32; 3],
+    /// Slot of the triangle ([`LIGHT_TRIANGLE`]).
+    pub slot: u32,
+    /// Direction the light travels (spot, directional), unit.
+    pub direction: [f32; 3],
+    /// Instance of the triangle or [`NONE`].
+    pub instance: u32,
+    /// Spot: falloff = clamp(cos θ · scale + offset, 0, 1)².
+    pub cone_scale: f32,
+    /// See `cone_scale`.
+    pub cone_offset: f32,
+    /// Unused, zero.
+    pub unused: [u32; 2],
+}
+
+/// Texels a light takes.
+pub const LIGHT_TEXELS: u32 = 4;
+
+/// A placed mesh.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct InstanceRecord {
+    /// Rows of the 3×4 matrix from object to (rebased) world space.
+    pub object_to_world: [[f32; 4]; 3],
+    /// Rows of its inverse.
+    pub world_to_object: [[f32; 4]; 3],
+    /// Slot of the mesh's root.
+    pub root_slot: u32,
+    /// First of the instance's lights.
+    pub first_light: u32,
+    /// 1 if the transform mirrors, so that the winding's front is the other side.
+    pub mirrored: u32,
+    /// Unused, zero.
+    pub unused: u32,
+}
+
+/// Texels an instance takes.
+pub const INSTANCE_TEXELS: u32 = 7;
+
+/// A CDF of n bins is n+1 words, from 0 to this total; bin i has probability (cdf\[i+1\] − cdf\[i\]) / total.
+pub const CDF_TOTAL: u32 = 1 << 31;
+
+/// Projection: pinhole or thin lens.
+pub const PROJECTION_PERSPECTIVE: u32 = 0;
+/// Projection: orthographic.
+pub const PROJECTION_ORTHOGRAPHIC: u32 = 1;
+
+/// Constants of one render (uniform buffer, std140: only 16-byte rows).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RenderConstants {
+    /// Camera position in rebased world space.
+    pub camera_origin: [f32; 3],
+    /// Thin lens radius, 0 for a pinhole.
+    pub lens_radius: f32,
+    /// Half the film's width on the plane at distance 1 (orthographic: in world units), along the camera's right.
+    pub camera_right: [f32; 3],
+    /// Distance of the plane in focus.
+    pub focus_distance: f32,
+    /// Half the film's height, along the camera's up.
+    pub camera_up: [f32; 3],
+    /// One of `PROJECTION_*`.
+    pub projection: u32,
+    /// Unit viewing direction.
+    pub camera_forward: [f32; 3],
+    /// Unused, zero.
+    pub unused: f32,
+    /// Film width in pixels.
+    pub width: u32,
+    /// Film height in pixels.
+    pub height: u32,
+    /// Seed of the sampler.
+    pub seed: u32,
+    /// Largest number of scattering events.
+    pub max_bounces: u32,
+    /// First sample index of the range rendered.
+    pub first_sample: u32,
+    /// One past its last sample index.
+    pub end_sample: u32,
+    /// First texel of the vertices in [`SceneArray::Attributes`].
+    pub vertices: u32,
+    /// Slot at which traversal starts.
+    pub root_slot: u32,
+    /// First texel of the materials in [`SceneArray::Tables`].
+    pub materials: u32,
+    /// First texel of the texture headers.
+    pub textures: u32,
+    /// First texel of the lights.
+    pub lights: u32,
+    /// First texel of the instances.
+    pub instances: u32,
+    /// First word of the light CDF in [`SceneArray::Tables`].
+    pub light_cdf_word: u32,
+    /// Number of lights.
+    pub light_count: u32,
+    /// Index of the environment among the lights, or [`NONE`] if it is not sampled.
+    pub environment_light: u32,
+    /// Environment image width.
+    pub environment_width: u32,
+    /// Environment image height.
+    pub environment_height: u32,
+    /// First word of its marginal CDF (over rows) in [`SceneArray::Environment`].
+    pub environment_marginal_word: u32,
+    /// First word of its conditional CDFs; row r starts at `+ r · (width + 1)`.
+    pub environment_conditional_word: u32,
+    /// Unused, zero.
+    pub unused_too: u32,
+    /// Constant radiance, or the factor on the image.
+    pub environment_radiance: [f32; 3],
+    /// Cosine of the environment's rotation about +Y.
+    pub environment_cos: f32,
+    /// Centre of the scene's bounds.
+    pub scene_center: [f32; 3],
+    /// Sine of the environment's rotation about +Y.
+    pub environment_sin: f32,
+}
+
+/// What a dispatch does: lanes `0..lanes` render the atoms (block `first_block` + a / pixels, pixel a mod pixels) with
+/// a = `first_atom` + lane.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct SliceConstants {
+    /// First atom, counted within `first_block`.
+    pub first_atom: u32,
+    /// Number of lanes that have an atom.
+    pub lanes: u32,
+    /// Aligned block of 16 sample indices that `first_atom` belongs to.
+    pub first_block: u32,
+    /// A lane saves its state after this many rays and goes on in the next dispatch.
+    pub ray_budget: u32,
+    /// 1 if the lanes go on from their saved state.
+    pub resume: u32,
+    /// Unused, zero.
+    pub unused: [u32; 3],
+}
+
+/// Samples of an aligned block.
+pub const BLOCK_SAMPLES: u32 = 16;
+
+/// The result of one atom: the sums over the samples of one pixel and block.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BlockResult {
+    /// Sum of radiance; the exact sum is `sum + compensation`.
+    pub sum: [f32; 3],
+    /// Sum of squared sample luminance.
+    pub luminance_squared: f32,
+    /// Low part of the compensated sum.
+    pub compensation: [f32; 3],
+    /// Rays traced.
+    pub rays: u32,
+    /// Bit i: sample i of the block was not finite.
+    pub non_finite: u32,
+    /// Bit i: a path of sample i was cut off by the safety cap on bounces.
+    pub capped: u32,
+    /// 1 when the atom is complete, 0 while its lane must be resumed.
+    pub complete: u32,
+    /// Paths that were ended in this block (samples).
+    pub samples: u32,
+}
