@@ -1,0 +1,37 @@
+# The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
+.PHONY: help deps build demo test test-drivers lint references clean
+.DEFAULT_GOAL := help
+
+help: ## lists these commands
+	@echo "Sunfleck, a headless path tracer on Vulkan compute. Commands:"
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1 \t\2/p' $(MAKEFILE_LIST) | expand -t 22
+
+deps: ## installs what is missing (apt-get on Debian and Ubuntu; elsewhere says what is needed)
+	@scripts/deps.sh
+
+build: deps ## builds the program, optimised
+	cargo build --release
+
+demo: build ## renders scenes/cornell_spheres.gltf to out/demo.exr and out/demo.png
+	@mkdir -p out
+	cargo run --release --quiet -- render scenes/cornell_spheres.gltf -o out/demo.exr -o out/demo.png \
+		--resolution 512x512 --spp 256
+	@ls -lh out/demo.exr out/demo.png
+
+test: deps ## builds and runs every test on the device of this machine
+	cargo test
+
+test-drivers: deps ## runs the tests of the GPU on lavapipe 22, lavapipe 25 (both back ends) and SwiftShader
+	@scripts/test-drivers.sh
+
+lint: deps ## formatting, clippy and the documentation's links
+	cargo fmt --check
+	cargo clippy --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items
+
+references: ## renders the reference images again with Mitsuba 3 (a quarter of an hour)
+	python3 tests/reference/make_references.py
+
+clean: ## removes what was built and rendered
+	cargo clean
+	rm -rf out
