@@ -98,7 +98,11 @@ impl KernelKey {
 
 impl fmt::Display for KernelKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {} {NODE_LAYOUT} chunk:{} stack:{}", self.trace, self.array_form, self.chunk_shift, self.stack_size)?;
+        write!(
+            f,
+            "{} {} {NODE_LAYOUT} chunk:{} stack:{}",
+            self.trace, self.array_form, self.chunk_shift, self.stack_size
+        )?;
         write!(f, " {} {} {} {}", self.integrator, self.light_sampling, self.mis_heuristic, self.env_sampling)?;
         write!(f, " [{}]", self.features.kept().join(" "))?;
         if self.lens {

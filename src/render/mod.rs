@@ -1,5 +1,6 @@
 //! Rendering: what is asked for ([`Settings`]), how it goes on ([`ProgressUpdate`]) and what comes out ([`RenderResult`]).
 
+mod function_kernel;
 mod kernel_key;
 mod open;
 mod path_tracer;
@@ -12,6 +13,7 @@ mod slices;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+pub use function_kernel::FunctionCall;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};
 pub use path_tracer::{BindingOverride, PathTracer, Run};
@@ -54,21 +56,19 @@ pub fn render(
     progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
 ) -> Result<RenderResult> {
     let camera_index = choose_camera(scene, settings.camera.as_deref())?;
-    let camera = scene
-        .cameras
-        .get(camera_index)
-        .ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)))?;
+    let camera =
+        scene.cameras.get(camera_index).ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)))?;
     let open = open_device(settings)?;
     tracing::info!("{}", open.reason);
     let start = Instant::now();
     let prepared = prepare_scene(scene, camera, settings)?;
     let prepare_seconds = start.elapsed().as_secs_f64();
-    let mut tracer =
-        PathTracer::new(&open.gpu, open.trace, &prepared, camera, settings, BindingOverride::default())?;
+    let mut tracer = PathTracer::new(&open.gpu, open.trace, &prepared, camera, settings, BindingOverride::default())?;
     let run = tracer.run(settings.seed, settings.samples(), settings.time, progress)?;
     let mut warnings = Vec::new();
     if run.capped_samples > 0 {
-        warnings.push(format!("{} samples had a path cut off at 65535 bounces: the image is too dark", run.capped_samples));
+        warnings
+            .push(format!("{} samples had a path cut off at 65535 bounces: the image is too dark", run.capped_samples));
     }
     for place in &run.first_non_finite {
         warnings.push(format!("pixel ({}, {}), sample {} is NaN or infinite", place.x, place.y, place.sample));

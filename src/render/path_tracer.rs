@@ -156,9 +156,8 @@ impl PathTracer {
         let mut run = Run::new(&self.constants);
         let start = Instant::now();
         let total_atoms = pixels * u64::from(blocks.end - blocks.start);
-        let total_samples = u64::from(samples.end - samples.start)
-            * u64::from(self.constants.width)
-            * u64::from(self.constants.height);
+        let total_samples =
+            u64::from(samples.end - samples.start) * u64::from(self.constants.width) * u64::from(self.constants.height);
         let mut next_atom = 0;
         let mut in_flight = std::collections::VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
@@ -324,8 +323,7 @@ fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
         let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
         return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
     };
-    let sources =
-        shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
+    let sources = shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
     let defines =
         [("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
     shader_compiler::compile(&sources, "path_trace.comp", &defines, true)

@@ -86,8 +86,7 @@ impl SceneBuffers {
             chunks.push(buffers?);
         }
         let addresses = (form == ArrayForm::DeviceAddress).then(|| upload_addresses(gpu, &chunks)).transpose()?;
-        let acceleration =
-            (trace == TraceBackend::RayQuery).then(|| build_acceleration(gpu, prepared)).transpose()?;
+        let acceleration = (trace == TraceBackend::RayQuery).then(|| build_acceleration(gpu, prepared)).transpose()?;
         let bytes = chunks.iter().flatten().map(|b| b.size).sum::<u64>()
             + acceleration.as_ref().map_or(0, AccelerationStructures::bytes);
         Ok(Self { chunks, empty, addresses, acceleration, bytes })
@@ -122,8 +121,7 @@ fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<Accelera
     for mesh in &prepared.meshes {
         let texels: &[Texel] = &slots[3 * mesh.slots.start as usize..3 * mesh.slots.end as usize];
         let words: &[u32] = bytemuck::cast_slice(texels);
-        let vertices: Vec<[f32; 3]> =
-            words.chunks_exact(3).map(|v| [v[0], v[1], v[2]].map(f32::from_bits)).collect();
+        let vertices: Vec<[f32; 3]> = words.chunks_exact(3).map(|v| [v[0], v[1], v[2]].map(f32::from_bits)).collect();
         let mut indices = vec![[0_u32; 3]; texels.len() / 3];
         for slot in prepared.triangle_slots(mesh) {
             let i = slot - mesh.slots.start;
@@ -131,8 +129,7 @@ fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<Accelera
         }
         geometry.push((keep_finite(vertices, &indices), indices));
     }
-    let meshes: Vec<_> =
-        geometry.iter().map(|(vertices, indices)| MeshGeometry { vertices, indices }).collect();
+    let meshes: Vec<_> = geometry.iter().map(|(vertices, indices)| MeshGeometry { vertices, indices }).collect();
     let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
     let mut instances = vec![InstanceGeometry { mesh: 0, transform: identity, custom_index: BAKED_INSTANCE }];
     instances.extend(prepared.instances.iter().zip(0..).map(|(instance, custom_index)| InstanceGeometry {
