@@ -18,7 +18,7 @@ mod watch;
 use std::io::{self, Write};
 
 use anyhow::Context;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Exit codes, for `--help`; [`sunfleck::Error::exit_code`] decides them.
 const EXIT_CODES: &str = "\
@@ -48,6 +48,12 @@ enum Command {
     Merge(merge::MergeArgs),
     Bench(bench::BenchArgs),
     Watch(watch::WatchArgs),
+}
+
+/// Parses the process's arguments; a usage error or `--help` ends the process.
+pub(crate) fn parse() -> Cli {
+    let matches = not_built::mark_in_help(Cli::command()).get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
 /// Does what the command line asks for.
