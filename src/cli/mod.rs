@@ -85,7 +85,11 @@ fn init_tracing() {
 /// Prints one JSON object on standard output.
 fn print_json(value: &serde_json::Value) -> anyhow::Result<()> {
     let mut stdout = io::stdout().lock();
-    writeln!(stdout, "{value:#}").and_then(|()| stdout.flush()).context("cannot write to standard output")
+    match writeln!(stdout, "{value:#}").and_then(|()| stdout.flush()) {
+        // A reader that has seen enough (`| head`) is no error.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.context("cannot write to standard output"),
+    }
 }
 
 /// Prints warnings for people, one line each.

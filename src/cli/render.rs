@@ -55,7 +55,6 @@ fn load_scene(job: &RenderJob) -> anyhow::Result<Scene> {
     let mut scene = load::resolve(&job.scene).map_err(Error::from)?;
     change_environment(&mut scene, &job.environment)?;
     scene.frame_if_no_camera();
-    scene.light_if_dark();
     print_warnings(&scene.warnings);
     if !job.quiet {
         scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
@@ -68,8 +67,11 @@ fn change_environment(scene: &mut Scene, change: &EnvironmentArgs) -> anyhow::Re
         scene.environment = load::load_environment(file, change.strength, change.rotation_degrees)
             .map_err(Error::from)
             .context("--env")?;
+        scene.light_if_dark();
         return Ok(());
     }
+    // Before the strength is applied, so that it acts on the added environment too.
+    scene.light_if_dark();
     match &mut scene.environment {
         Environment::None => {}
         Environment::Constant(radiance) => *radiance = radiance.map(|c| c * change.strength),
@@ -98,12 +100,9 @@ fn write_outputs(job: &RenderJob, scene: &Scene, result: &RenderResult) -> anyho
 }
 
 fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {
-    let asked = job.settings.samples();
-    let most = result.film.pixels().iter().map(|p| p.count).max().unwrap_or(0);
     Metadata {
         seed: Some(job.settings.seed),
-        // A run that was ended early holds the first samples of its range.
-        sample_ranges: vec![asked.start..asked.start.saturating_add(most).min(asked.end)],
+        sample_ranges: vec![job.settings.samples_in(&result.film)],
         render_time_seconds: Some(result.seconds.render as f32),
         world_to_camera: Some(result.world_to_camera),
         world_to_ndc: Some(result.world_to_ndc),

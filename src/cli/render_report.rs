@@ -9,6 +9,7 @@ use super::render_args::RenderJob;
 /// The object of `--json`. Rates are per second of the render part alone.
 pub(crate) fn report(job: &RenderJob, result: &RenderResult) -> Value {
     let rate = |count: u64| count as f64 / result.seconds.render.max(1e-9);
+    let samples = job.settings.samples_in(&result.film);
     let outputs: Vec<_> = job.outputs.iter().map(|(path, _)| path.display().to_string()).collect();
     json!({
         "scene": job.scene,
@@ -20,7 +21,7 @@ pub(crate) fn report(job: &RenderJob, result: &RenderResult) -> Value {
         "width": result.film.width(),
         "height": result.film.height(),
         "spp": result.film.mean_samples_per_pixel(),
-        "samples": [job.settings.samples().start, job.settings.samples().end],
+        "samples": [samples.start, samples.end],
         "seed": job.settings.seed,
         "integrator": job.settings.integrator.name(),
         "sampler": job.settings.sampler.name(),
