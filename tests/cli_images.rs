@@ -21,8 +21,8 @@ fn write(folder: &Path, name: &str, side: u32, radiance: f64, start: u32, count:
         let sum = radiance * f64::from(count);
         film.add_block(pixel, [sum; 3], sum * radiance, count);
     }
-    let ranges = Vec::from_iter([start..start + count]);
-    let metadata = Metadata { seed: Some(0), sample_ranges: ranges, ..Metadata::default() };
+    let mut metadata = Metadata { seed: Some(0), ..Metadata::default() };
+    metadata.sample_ranges.push(start..start + count);
     ExrImage::from_film(&film, metadata).write(&folder.join(name)).unwrap();
 }
 

@@ -1,10 +1,12 @@
 //! `sunfleck render`: from a job to images and a report.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Context;
 use sunfleck::Error;
+use sunfleck::film::Film;
 use sunfleck::film::exr::ExrImage;
 use sunfleck::film::metadata::{Metadata, REC709_CHROMATICITIES, software};
 use sunfleck::film::output::ImageFormat;
@@ -19,7 +21,9 @@ use super::{interrupt, print_json, print_warnings};
 
 /// Renders the job and writes its images.
 pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
+    let loading = Instant::now();
     let scene = load_scene(&job)?;
+    let load_seconds = loading.elapsed().as_secs_f64();
     interrupt::install();
     let mut progress = Progress::new(job.quiet);
     let result = render(&scene, &job.settings, &mut |update| {
@@ -28,6 +32,7 @@ pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
     });
     progress.finish();
     let mut result = result?;
+    result.seconds.load = load_seconds;
     let writing = Instant::now();
     write_outputs(&job, &scene, &result)?;
     result.seconds.write = writing.elapsed().as_secs_f64();
@@ -36,7 +41,7 @@ pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
         print_summary(&job, &result);
     }
     if job.json {
-        print_json(&report(&job, &result))?;
+        print_json(&report(&job, &scene, &result))?;
     }
     verdict(&job.settings, &result)
 }
@@ -83,20 +88,25 @@ fn change_environment(scene: &mut Scene, change: &EnvironmentArgs) -> anyhow::Re
     Ok(())
 }
 
-fn write_outputs(job: &RenderJob, scene: &Scene, result: &RenderResult) -> anyhow::Result<()> {
+/// Writes every image. If one fails the others are still written, since the samples took their time.
+fn write_outputs(job: &RenderJob, scene: &Scene, result: &RenderResult) -> sunfleck::Result<()> {
+    let mut outcome = Ok(());
     for (path, format) in &job.outputs {
-        match format {
-            ImageFormat::Exr => ExrImage::from_film(&result.film, metadata(job, scene, result)).write(path)?,
-            ImageFormat::Png => {
-                let (pixels, non_finite) = tone_map_srgb8(&result.film.radiance(), job.exposure_ev, job.tone_map);
-                write_png(path, result.film.width(), result.film.height(), &pixels)?;
-                if non_finite > 0 {
-                    eprintln!("warning: {}: {non_finite} pixels are NaN or infinite; they are magenta", path.display());
-                }
-            }
-        }
+        let written = match format {
+            ImageFormat::Exr => ExrImage::from_film(&result.film, metadata(job, scene, result)).write(path),
+            ImageFormat::Png => write_tone_mapped(path, job, &result.film),
+        };
+        outcome = outcome.and(written);
     }
-    Ok(())
+    outcome
+}
+
+fn write_tone_mapped(path: &Path, job: &RenderJob, film: &Film) -> sunfleck::Result<()> {
+    let (pixels, non_finite) = tone_map_srgb8(&film.radiance(), job.exposure_ev, job.tone_map);
+    if non_finite > 0 {
+        eprintln!("warning: {}: {non_finite} pixels are NaN or infinite; they are magenta", path.display());
+    }
+    write_png(path, film.width(), film.height(), &pixels)
 }
 
 fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {

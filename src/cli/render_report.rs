@@ -2,12 +2,13 @@
 
 use serde_json::{Value, json};
 use sunfleck::render::{RenderResult, StopReason};
+use sunfleck::scene::Scene;
 
 use super::progress::{time, with_prefix};
 use super::render_args::RenderJob;
 
 /// The object of `--json`. Rates are per second of the render part alone.
-pub(crate) fn report(job: &RenderJob, result: &RenderResult) -> Value {
+pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Value {
     let rate = |count: u64| count as f64 / result.seconds.render.max(1e-9);
     let samples = job.settings.samples_in(&result.film);
     let outputs: Vec<_> = job.outputs.iter().map(|(path, _)| path.display().to_string()).collect();
@@ -37,7 +38,8 @@ pub(crate) fn report(job: &RenderJob, result: &RenderResult) -> Value {
         "non_finite_samples": result.non_finite_samples,
         "first_non_finite": result.first_non_finite,
         "gpu_bytes": result.gpu_bytes,
-        "warnings": result.warnings,
+        "notes": scene.notes,
+        "warnings": [scene.warnings.as_slice(), result.warnings.as_slice()].concat(),
         "outputs": outputs,
     })
 }
