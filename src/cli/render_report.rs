@@ -10,6 +10,7 @@ use super::render_args::RenderJob;
 /// The object of `--json`. Rates are per second of the render part alone.
 pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Value {
     let rate = |count: u64| count as f64 / result.seconds.render.max(1e-9);
+    let warnings = [scene.warnings.as_slice(), result.warnings.as_slice()].concat();
     let samples = job.settings.samples_in(&result.film);
     let outputs: Vec<_> = job.outputs.iter().map(|(path, _)| path.display().to_string()).collect();
     json!({
@@ -39,7 +40,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "first_non_finite": result.first_non_finite,
         "gpu_bytes": result.gpu_bytes,
         "notes": scene.notes,
-        "warnings": [scene.warnings.as_slice(), result.warnings.as_slice()].concat(),
+        "warnings": warnings,
         "outputs": outputs,
     })
 }
