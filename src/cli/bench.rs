@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-/// Measure time against error to a reference (not built yet).
+/// Measure time against error to a reference.
 #[derive(Args, Debug)]
 pub(crate) struct BenchArgs {
     /// A scene or a suite, and flags.

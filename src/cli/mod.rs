@@ -18,7 +18,7 @@ mod watch;
 use std::io::{self, Write};
 
 use anyhow::Context;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Exit codes, for `--help`; [`sunfleck::Error::exit_code`] decides them.
 const EXIT_CODES: &str = "\
@@ -50,6 +50,12 @@ enum Command {
     Watch(watch::WatchArgs),
 }
 
+/// Parses the process's arguments; a usage error or `--help` ends the process.
+pub(crate) fn parse() -> Cli {
+    let matches = not_built::mark_in_help(Cli::command()).get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
 /// Does what the command line asks for.
 pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
     init_tracing();
@@ -79,7 +85,11 @@ fn init_tracing() {
 /// Prints one JSON object on standard output.
 fn print_json(value: &serde_json::Value) -> anyhow::Result<()> {
     let mut stdout = io::stdout().lock();
-    writeln!(stdout, "{value:#}").and_then(|()| stdout.flush()).context("cannot write to standard output")
+    match writeln!(stdout, "{value:#}").and_then(|()| stdout.flush()) {
+        // A reader that has seen enough (`| head`) is no error.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.context("cannot write to standard output"),
+    }
 }
 
 /// Prints warnings for people, one line each.

@@ -36,9 +36,28 @@ pub(crate) fn refuse(command: &Command) -> sunfleck::Result<()> {
         return Ok(());
     }
     let verb = if asked.len() == 1 { "is" } else { "are" };
-    Err(sunfleck::Error::Usage(format!(
-        "{} {verb} not built yet in sunfleck {}",
-        asked.join(", "),
-        env!("CARGO_PKG_VERSION")
-    )))
+    let version = env!("CARGO_PKG_VERSION");
+    Err(sunfleck::Error::Usage(format!("{} {verb} not built yet in sunfleck {version}", asked.join(", "))))
+}
+
+/// Says so in `--help` too, so that nobody has to try.
+pub(crate) fn mark_in_help(command: clap::Command) -> clap::Command {
+    NOT_BUILT.iter().fold(command, |command, (name, _)| match name.strip_prefix("--") {
+        None => command.mut_subcommand(*name, |sub| {
+            let about = format!("{} [not built yet]", sub.get_about().cloned().unwrap_or_default());
+            sub.about(about)
+        }),
+        Some(flag) => command.mut_subcommand("render", |sub| {
+            let (flag, value) = flag.split_once(' ').unwrap_or((flag, ""));
+            // Flags whose names clap does not know cannot be marked; a test would show them missing in the help.
+            sub.mut_args(|arg| {
+                if arg.get_long() != Some(flag) {
+                    return arg;
+                }
+                let space = if value.is_empty() { "" } else { " " };
+                let help = format!("{} [{value}{space}not built yet]", arg.get_help().cloned().unwrap_or_default());
+                arg.help(help)
+            })
+        }),
+    })
 }

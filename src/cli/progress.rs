@@ -90,3 +90,15 @@ pub(crate) fn with_prefix(number: f64) -> String {
         None => format!("{number:.0} "),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_and_rates_read_well() {
+        let times = [0.123, 9.4, 12.0, 59.7, 200.0, 7500.0].map(time);
+        assert_eq!(times, ["0.12 s", "9.40 s", "12 s", "1 min 00 s", "3 min 20 s", "2 h 05 min"]);
+        assert_eq!([12.0, 1234.0, 5.6e7].map(with_prefix), ["12 ", "1.23 k", "56.00 M"]);
+    }
+}

@@ -2,13 +2,16 @@
 
 use serde_json::{Value, json};
 use sunfleck::render::{RenderResult, StopReason};
+use sunfleck::scene::Scene;
 
 use super::progress::{time, with_prefix};
 use super::render_args::RenderJob;
 
 /// The object of `--json`. Rates are per second of the render part alone.
-pub(crate) fn report(job: &RenderJob, result: &RenderResult) -> Value {
+pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Value {
     let rate = |count: u64| count as f64 / result.seconds.render.max(1e-9);
+    let warnings = [scene.warnings.as_slice(), result.warnings.as_slice()].concat();
+    let samples = job.settings.samples_in(&result.film);
     let outputs: Vec<_> = job.outputs.iter().map(|(path, _)| path.display().to_string()).collect();
     json!({
         "scene": job.scene,
@@ -20,7 +23,7 @@ pub(crate) fn report(job: &RenderJob, result: &RenderResult) -> Value {
         "width": result.film.width(),
         "height": result.film.height(),
         "spp": result.film.mean_samples_per_pixel(),
-        "samples": [job.settings.samples().start, job.settings.samples().end],
+        "samples": [samples.start, samples.end],
         "seed": job.settings.seed,
         "integrator": job.settings.integrator.name(),
         "sampler": job.settings.sampler.name(),
@@ -36,7 +39,8 @@ pub(crate) fn report(job: &RenderJob, result: &RenderResult) -> Value {
         "non_finite_samples": result.non_finite_samples,
         "first_non_finite": result.first_non_finite,
         "gpu_bytes": result.gpu_bytes,
-        "warnings": result.warnings,
+        "notes": scene.notes,
+        "warnings": warnings,
         "outputs": outputs,
     })
 }

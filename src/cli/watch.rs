@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-/// Render again whenever a shader changes, with a live page in the browser (not built yet).
+/// Render again whenever a shader changes, with a live page in the browser.
 #[derive(Args, Debug)]
 pub(crate) struct WatchArgs {
     /// A scene, and flags.

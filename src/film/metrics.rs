@@ -7,7 +7,7 @@ use super::png::tone_map_srgb8;
 use super::tonemap::ToneMap;
 
 /// The differences of a test image from a reference. All but FLIP are taken in linear radiance, over the pixels that
-/// are finite in both images, in f64.
+/// are finite in both images, in f64; without such a pixel the means are NaN (`null` in JSON).
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Difference {
     /// Mean squared error: the mean over pixels and channels of (a − b)².
@@ -53,17 +53,18 @@ pub fn compare(a: &[[f32; 3]], b: &[[f32; 3]]) -> Difference {
         for channel in 0..3 {
             let (a, b) = (f64::from(a[channel]), f64::from(b[channel]));
             let square = (a - b) * (a - b);
-            sums.mse += square / 3.0;
-            sums.rel_mse += square / (b * b + RELATIVE_ERROR_EPSILON * RELATIVE_ERROR_EPSILON) / 3.0;
+            sums.mse += square;
+            sums.rel_mse += square / (b * b + RELATIVE_ERROR_EPSILON * RELATIVE_ERROR_EPSILON);
             sums.mean_difference[channel] += a - b;
             sums.mean_a[channel] += a;
             sums.mean_b[channel] += b;
             sums.max_difference = sums.max_difference.max((a - b).abs());
         }
     }
-    let n = sums.compared_pixels.max(1) as f64;
-    sums.mse /= n;
-    sums.rel_mse /= n;
+    // Of no pixel at all nothing is known: 0/0 makes the means NaN rather than a flattering 0.
+    let n = sums.compared_pixels as f64;
+    sums.mse /= 3.0 * n;
+    sums.rel_mse /= 3.0 * n;
     for means in [&mut sums.mean_difference, &mut sums.mean_a, &mut sums.mean_b] {
         *means = means.map(|sum| sum / n);
     }

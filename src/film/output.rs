@@ -72,10 +72,17 @@ fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
+    if !folder.is_dir() {
+        return Err(Error::input(
+            path,
+            format!("cannot be written: there is no folder '{}'; create it", folder.display()),
+        ));
+    }
     let mut builder = tempfile::Builder::new();
     builder.prefix(".sunfleck-").suffix(".part");
     // Temporary files are private by default; an image gets the permissions that any new file would (0666 & !umask).
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder).map_err(|e| Error::io(path, "write (its folder must exist and be writable)", e))
+    // The library's error names the temporary file, which means nothing to the user: only its kind is kept.
+    builder.tempfile_in(folder).map_err(|e| Error::io(path, "write in its folder", e.kind().into()))
 }

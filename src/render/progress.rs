@@ -35,3 +35,23 @@ impl ProgressUpdate {
         (fraction > 0.0).then(|| self.elapsed.mul_f64(((1.0 - fraction) / fraction).min(1e9)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_follows_from_what_is_further() {
+        let update = ProgressUpdate {
+            samples_done: 25,
+            samples_total: Some(100),
+            elapsed: Duration::from_secs(10),
+            time_limit: Some(Duration::from_secs(20)),
+        };
+        assert_eq!(update.fraction(), 0.5);
+        assert_eq!(update.remaining(), Some(Duration::from_secs(10)));
+        assert_eq!(update.samples_per_second(), 2.5);
+        let start = ProgressUpdate { samples_done: 0, time_limit: None, ..update };
+        assert_eq!(start.remaining(), None);
+    }
+}

@@ -70,7 +70,7 @@ impl fmt::Display for StopReason {
 /// Wall time of the parts of a run, in seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Seconds {
-    /// Reading the scene.
+    /// Reading the scene. The caller of the renderer fills it in.
     pub load: f64,
     /// Building BVHs and tables.
     pub prepare: f64,
@@ -80,7 +80,7 @@ pub struct Seconds {
     pub upload: f64,
     /// Tracing.
     pub render: f64,
-    /// Writing the images.
+    /// Writing the images. The caller of the renderer fills it in.
     pub write: f64,
 }
 

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
+use crate::film::Film;
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -79,6 +80,14 @@ impl Settings {
     /// The sample indices to render.
     pub fn samples(&self) -> Range<u32> {
         self.sample_range.clone().unwrap_or(0..self.spp)
+    }
+
+    /// The sample indices that a film rendered with these settings holds: a run that ended early has the first ones,
+    /// and its pixels may differ in how many.
+    pub fn samples_in(&self, film: &Film) -> Range<u32> {
+        let asked = self.samples();
+        let most = film.pixels().iter().map(|pixel| pixel.count).max().unwrap_or(0);
+        asked.start..asked.start.saturating_add(most).min(asked.end)
     }
 }
 
@@ -259,4 +268,29 @@ pub fn choose_camera(scene: &Scene, choice: Option<&str>) -> Result<usize> {
         let list: Vec<_> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} '{}'", c.name)).collect();
         Error::Usage(format!("--camera: no camera '{wanted}' in {}; there are: {}", scene.name, list.join(", ")))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back() {
+        for integrator in Integrator::ALL {
+            assert_eq!(integrator.to_string().parse(), Ok(*integrator));
+        }
+        let error = "rtx".parse::<TraceChoice>().unwrap_err();
+        assert_eq!(error, "unknown trace back end 'rtx'; there are auto, ray-query, bvh");
+        assert_eq!("2".parse(), Ok(DeviceChoice::Index(2)));
+        assert_eq!("H200".parse(), Ok(DeviceChoice::Name("H200".to_owned())));
+    }
+
+    #[test]
+    fn a_run_that_ended_early_holds_the_first_samples() {
+        let settings = Settings { sample_range: Some(64..128), ..Settings::default() };
+        let mut film = Film::new(1, 2);
+        assert_eq!(settings.samples_in(&film), 64..64);
+        film.add_block(1, [0.0; 3], 0.0, 16);
+        assert_eq!(settings.samples_in(&film), 64..80);
+    }
 }
