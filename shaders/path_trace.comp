@@ -116,12 +116,12 @@ uint scattered_emission_weight(LaneState lane, BsdfSample scattered) {
 }
 
 // Russian roulette: survives with probability min(1, max throughput · η²), which keeps the expectation (Arvo and Kirk
-// 1990). It starts at the third scattering event; late paths always have a chance of 1/20 to end, so that white closed
+// 1990). It starts at the third scattering event; late paths always have a chance of 1/256 to end, so that white closed
 // rooms end too.
 bool survives_roulette(inout LaneState lane, float u) {
     if (lane.bounce < 2u) return true;
     float survival = min(1.0, max_component(lane.throughput) * lane.radiance_scale);
-    if (lane.bounce >= 64u) survival = min(survival, 0.95);
+    if (lane.bounce >= 64u) survival = min(survival, 0.99609375);
     // Written so that a NaN survives and is seen.
     if (u >= survival) return false;
     lane.throughput /= survival;

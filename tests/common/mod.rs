@@ -3,4 +3,5 @@
 
 pub mod gpu;
 pub mod reference;
+pub mod scenes;
 pub mod statistics;

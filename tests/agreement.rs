@@ -1,0 +1,92 @@
+//! Estimators that must agree: the ways to look for light and to sample the environment, on every scene of the project.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::scenes::{all_scenes, scene, short_form};
+use common::statistics::Estimate;
+use common::{gpu, scenes};
+use sunfleck::render::{EnvSampling, LightSampling, MisHeuristic, Settings};
+use sunfleck::scene::{Environment, Scene};
+
+fn mean(scene: &Scene, settings: &Settings) -> [Estimate; 3] {
+    let mut tracer = gpu::path_tracer(scene, settings);
+    scenes::seeds(&mut tracer, settings, if short_form() { 16 } else { 32 }, 8).image()
+}
+
+fn assert_agree(what: &str, a: [Estimate; 3], b: [Estimate; 3]) {
+    for (channel, (a, b)) in a.iter().zip(&b).enumerate() {
+        println!(
+            "{what}, channel {channel}: {:.5} ± {:.1e}, {:.5} ± {:.1e}",
+            a.mean,
+            a.standard_error(),
+            b.mean,
+            b.standard_error()
+        );
+        assert!(
+            a.deviation(b) < 4.0,
+            "{what}, channel {channel}: {} standard errors apart: {a:?} {b:?}",
+            a.deviation(b)
+        );
+    }
+}
+
+#[test]
+fn ways_to_look_for_light_agree_on_every_scene() {
+    for name in all_scenes().iter().map(String::as_str).chain(["cornell"]) {
+        // Their own tests hold the furnaces to exact numbers.
+        if name.starts_with("furnace") {
+            continue;
+        }
+        let scene = scene(name);
+        let settings = Settings { max_bounces: Some(6), ..gpu::settings(48, 48) };
+        let reference = mean(&scene, &settings);
+        for mode in [LightSampling::Mixture, LightSampling::Nee, LightSampling::Bsdf] {
+            let other = mean(&scene, &Settings { light_sampling: mode, ..settings.clone() });
+            assert_agree(&format!("{name}, mis and {mode}"), reference, other);
+        }
+    }
+}
+
+#[test]
+fn balance_and_power_heuristics_agree() {
+    let scene = scene("metallic_roughness");
+    let power = gpu::settings(48, 48);
+    let balance = Settings { mis_heuristic: MisHeuristic::Balance, ..power.clone() };
+    assert_agree("power and balance", mean(&scene, &power), mean(&scene, &balance));
+}
+
+/// A dim sky with a small sun, off the texel grid's symmetries.
+fn sky() -> Environment {
+    let (width, height) = (32_u32, 16_u32);
+    let texel = |x: u32, y: u32| {
+        if (x, y) == (21, 4) { [40.0, 36.0, 30.0] } else { [0.2, 0.3, 0.1 + 0.02 * y as f32] }
+    };
+    let texels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
+    Environment::Image {
+        name: "sky".to_owned(),
+        width,
+        height,
+        texels: Arc::new(texels),
+        strength: 0.7,
+        rotation_radians: 0.6,
+    }
+}
+
+#[test]
+fn environment_samplings_agree() {
+    let scene = Scene { environment: sky(), ..scene("environment") };
+    let settings = gpu::settings(48, 48);
+    let reference = mean(&scene, &settings);
+    for (env_sampling, light_sampling) in [
+        (EnvSampling::Uniform, LightSampling::Mis),
+        (EnvSampling::Importance, LightSampling::Mixture),
+        (EnvSampling::Importance, LightSampling::Nee),
+        (EnvSampling::Uniform, LightSampling::Nee),
+        (EnvSampling::Importance, LightSampling::Bsdf),
+    ] {
+        let other = Settings { env_sampling, light_sampling, ..settings.clone() };
+        assert_agree(&format!("importance mis and {env_sampling} {light_sampling}"), reference, mean(&scene, &other));
+    }
+}
