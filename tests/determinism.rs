@@ -26,10 +26,7 @@ fn range(tracer: &mut PathTracer, samples: Range<u32>) -> Film {
 }
 
 fn bits(film: &Film) -> Vec<[u64; 4]> {
-    film.pixels()
-        .iter()
-        .map(|p| [p.sum_rgb[0], p.sum_rgb[1], p.sum_rgb[2], p.sum_luminance_squared].map(f64::to_bits))
-        .collect()
+    film.pixels().iter().map(|p| [p.rgb[0], p.rgb[1], p.rgb[2], p.luminance_squared].map(f64::to_bits)).collect()
 }
 
 #[test]
