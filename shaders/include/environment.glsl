@@ -82,9 +82,10 @@ EnvironmentSample environment_sample(RenderConstants constants, uvec4 bits) {
     CdfSample row = cdf_sample_ENVIRONMENT(constants.environment_marginal_word, constants.environment_height, bits.x);
     CdfSample column = cdf_sample_ENVIRONMENT(environment_row_word(constants, row.index),
                                               constants.environment_width, bits.y);
-    // In the open cell, so that sin θ > 0 at the poles too.
     vec2 inside = (vec2(bits.zw >> 9u) + 0.5) * 1.1920928955078125e-7;
-    vec2 uv = (vec2(column.index, row.index) + inside) / vec2(constants.environment_width, constants.environment_height);
+    // Rounded, the end of the last row would be the pole itself, where sin θ is 0 and the density infinite.
+    vec2 uv = min((vec2(column.index, row.index) + inside) / vec2(constants.environment_width, constants.environment_height),
+                  1.0 - UNIT_ROUNDOFF);
     vec2 polar = cos_sin_turns(0.5 * uv.y);
     vec2 azimuth = cos_sin_turns(uv.x);
     vec3 w = vec3(azimuth.x * polar.y, polar.x, azimuth.y * polar.y);
