@@ -211,5 +211,6 @@ pub fn direction_to_uv(direction: DVec3, rotation_radians: f64) -> (f64, f64) {
     let x = direction.x * cos - direction.z * sin;
     let z = direction.x * sin + direction.z * cos;
     let u = (z.atan2(x) / TAU).rem_euclid(1.0);
-    (if u < 1.0 { u } else { 0.0 }, direction.y.clamp(-1.0, 1.0).acos() / PI)
+    // Not by acos, which near the poles would amplify the rounding of a direction that comes from f32.
+    (if u < 1.0 { u } else { 0.0 }, x.hypot(z).atan2(direction.y) / PI)
 }
