@@ -11,10 +11,8 @@ use sunfleck::scene::load::{load_environment, load_scene};
 const LONGEST: Duration = Duration::from_secs(20);
 
 fn collection() -> Option<PathBuf> {
-    let folder = std::env::var_os("SUNFLECK_ASSETS").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets"),
-        PathBuf::from,
-    );
+    let folder = std::env::var_os("SUNFLECK_ASSETS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets"), PathBuf::from);
     if !folder.is_dir() {
         eprintln!("{} is absent: real input is not tested (set SUNFLECK_ASSETS)", folder.display());
         return None;
@@ -23,7 +21,8 @@ fn collection() -> Option<PathBuf> {
 }
 
 fn files(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) {
-    let mut entries: Vec<PathBuf> = fs::read_dir(folder).expect("the folder is readable").flatten().map(|e| e.path()).collect();
+    let mut entries: Vec<PathBuf> =
+        fs::read_dir(folder).expect("the folder is readable").flatten().map(|e| e.path()).collect();
     entries.sort();
     for path in entries {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
@@ -48,8 +47,17 @@ fn scene_files() {
         match result {
             Ok(scene) => {
                 let t: usize = scene.meshes.iter().flat_map(|m| &m.primitives).map(|p| p.triangles.len()).sum();
-                println!("ok {shown} {took:?} tris {t} inst {} cams {} lights {} mats {} imgs {}", scene.instances.len(), scene.cameras.len(), scene.lights.len(), scene.materials.len(), scene.images.len());
-                for w in &scene.warnings { println!("      W {w}"); }
+                println!(
+                    "ok {shown} {took:?} tris {t} inst {} cams {} lights {} mats {} imgs {}",
+                    scene.instances.len(),
+                    scene.cameras.len(),
+                    scene.lights.len(),
+                    scene.materials.len(),
+                    scene.images.len()
+                );
+                for w in &scene.warnings {
+                    println!("      W {w}");
+                }
                 scene.validate().expect("valid");
             }
             Err(error) => println!("ERR {shown}: {error}"),
@@ -67,7 +75,9 @@ fn environment_files() {
         let start = Instant::now();
         let shown = path.strip_prefix(&folder).unwrap_or(&path).display();
         match load_environment(&path, 1.0, 0.0) {
-            Ok(sunfleck::scene::Environment::Image { width, height, .. }) => println!("ok {shown} {width}x{height} {:?}", start.elapsed()),
+            Ok(sunfleck::scene::Environment::Image { width, height, .. }) => {
+                println!("ok {shown} {width}x{height} {:?}", start.elapsed())
+            }
             Ok(_) => unreachable!(),
             Err(error) => println!("ERR {shown}: {error}"),
         }
