@@ -12,24 +12,24 @@ use sunfleck::scene::{Scene, SceneError, SceneResult};
 use tempfile::TempDir;
 
 /// A data URI of bytes.
-pub fn data_uri(bytes: &[u8]) -> String {
+pub(crate) fn data_uri(bytes: &[u8]) -> String {
     format!("data:application/octet-stream;base64,{}", BASE64_STANDARD.encode(bytes))
 }
 
 /// Little-endian bytes of floats.
-pub fn floats(values: &[f32]) -> Vec<u8> {
+pub(crate) fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
 /// Bytes of the triangle (0,0,0), (1,0,0), (0,1,0), then its 16-bit indices: 36 + 6 bytes.
-pub fn triangle_bytes() -> Vec<u8> {
+pub(crate) fn triangle_bytes() -> Vec<u8> {
     let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
     bytes.extend([0, 0, 1, 0, 2, 0]);
     bytes
 }
 
 /// A document of one triangle: accessor 0 is its positions, accessor 1 its indices, all in one buffer.
-pub fn triangle() -> Value {
+pub(crate) fn triangle() -> Value {
     json!({
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -50,7 +50,7 @@ pub fn triangle() -> Value {
 }
 
 /// Replaces, or adds, the value at a JSON pointer; a last `-` appends to an array.
-pub fn set(document: &mut Value, pointer: &str, value: Value) {
+pub(crate) fn set(document: &mut Value, pointer: &str, value: Value) {
     let (parent, key) = pointer.rsplit_once('/').expect("a pointer begins with /");
     match document.pointer_mut(parent).expect("the parent exists") {
         Value::Object(members) => {
@@ -63,7 +63,7 @@ pub fn set(document: &mut Value, pointer: &str, value: Value) {
 }
 
 /// The triangle with a few values replaced.
-pub fn triangle_with(changes: &[(&str, Value)]) -> Value {
+pub(crate) fn triangle_with(changes: &[(&str, Value)]) -> Value {
     let mut document = triangle();
     for (pointer, value) in changes {
         set(&mut document, pointer, value.clone());
@@ -72,21 +72,21 @@ pub fn triangle_with(changes: &[(&str, Value)]) -> Value {
 }
 
 /// The triangle with other bytes in its buffer.
-pub fn triangle_of(bytes: &[u8]) -> Value {
+pub(crate) fn triangle_of(bytes: &[u8]) -> Value {
     triangle_with(&[("/buffers/0", json!({"byteLength": bytes.len(), "uri": data_uri(bytes)}))])
 }
 
 /// A folder with files in it, removed when dropped.
-pub struct Folder(TempDir);
+pub(crate) struct Folder(TempDir);
 
 impl Folder {
     /// An empty folder.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(TempDir::new().expect("a temporary folder"))
     }
 
     /// Writes a file and returns its path.
-    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+    pub(crate) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.path().join(name);
         fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
         fs::write(&path, bytes).expect("the file can be written");
@@ -95,7 +95,7 @@ impl Folder {
 }
 
 /// Loads a document as a .gltf file; what loads must also be valid.
-pub fn load(document: &Value) -> SceneResult<Scene> {
+pub(crate) fn load(document: &Value) -> SceneResult<Scene> {
     let folder = Folder::new();
     let scene = load_scene(&folder.write("test.gltf", document.to_string()))?;
     scene.validate().expect("a scene that loads is valid");
@@ -103,17 +103,17 @@ pub fn load(document: &Value) -> SceneResult<Scene> {
 }
 
 /// Loads a document that must load.
-pub fn load_ok(document: &Value) -> Scene {
+pub(crate) fn load_ok(document: &Value) -> Scene {
     load(document).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The error of a document that must not load.
-pub fn load_error(document: &Value) -> SceneError {
+pub(crate) fn load_error(document: &Value) -> SceneError {
     load(document).err().unwrap_or_else(|| panic!("this should not load: {document}"))
 }
 
 /// A .glb of a JSON text and a binary chunk.
-pub fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
+pub(crate) fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
     let chunk = |kind: &[u8; 4], bytes: &[u8], padding: u8| {
         let padded = bytes.len().next_multiple_of(4);
         let mut chunk = (padded as u32).to_le_bytes().to_vec();
@@ -131,7 +131,7 @@ pub fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
 }
 
 /// A PNG of one colour.
-pub fn png(width: u32, height: u32, color: [u8; 4]) -> Vec<u8> {
+pub(crate) fn png(width: u32, height: u32, color: [u8; 4]) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::RgbaImage::from_pixel(width, height, image::Rgba(color))
         .write_to(&mut bytes, image::ImageFormat::Png)

@@ -8,8 +8,9 @@ use super::Loader;
 use super::json::Json;
 use crate::scene::{Instance, SceneResult};
 
-/// A file of a few nodes, each twice below the one before, unfolds to any number; no real one comes near this.
-const MAX_VISITS: usize = 1 << 22;
+/// How often nodes may be shown again below a further parent: a few nodes, each twice below the one before, would
+/// unfold to any number.
+const MAX_REPEATS: usize = 1 << 18;
 
 impl Loader<'_> {
     /// Walks the nodes of the scene to show, and loads what they hold.
@@ -33,14 +34,15 @@ impl Loader<'_> {
     /// Visits the nodes, parents before children. The specification wants trees; where a node has several parents it is
     /// shown below each. An explicit stack: files can nest deeper than ours.
     fn walk<'b>(&mut self, roots: Vec<(usize, Json<'b>)>) -> SceneResult<()> {
-        let shared = check_hierarchy(&roots)?;
+        let (shared, count) = check_hierarchy(&roots)?;
         let mut visits = 0;
         let mut stack: Vec<(usize, Json<'b>, DAffine3)> =
             roots.into_iter().rev().map(|(index, node)| (index, node, DAffine3::IDENTITY)).collect();
         while let Some((index, node, parent_to_world)) = stack.pop() {
             visits += 1;
-            if visits > MAX_VISITS {
-                return Err(node.fail(format!("shared nodes unfold to more than {MAX_VISITS} nodes")));
+            if visits > count + MAX_REPEATS {
+                let message = format!("nodes with several parents unfold to more than {MAX_REPEATS} further ones");
+                return Err(node.fail(message).hint("instance the mesh by plain nodes instead"));
             }
             if shared.contains(&index) {
                 self.warnings.add("nodes with several parents are shown below each of them", &node.pointer);
@@ -93,8 +95,8 @@ fn root_nodes<'a>(root: &Json<'a>) -> SceneResult<Vec<(usize, Json<'a>)>> {
 }
 
 /// Refuses cycles, and roots that are also below another node (they would be shown twice in one place). Returns the
-/// nodes with several parents.
-fn check_hierarchy(roots: &[(usize, Json<'_>)]) -> SceneResult<HashSet<usize>> {
+/// nodes with several parents, and the number of nodes.
+fn check_hierarchy(roots: &[(usize, Json<'_>)]) -> SceneResult<(HashSet<usize>, usize)> {
     #[derive(PartialEq)]
     enum State {
         Open,
@@ -141,7 +143,7 @@ fn check_hierarchy(roots: &[(usize, Json<'_>)]) -> SceneResult<HashSet<usize>> {
             stack.push(Step::Enter(child_index, child_node));
         }
     }
-    Ok(shared)
+    Ok((shared, states.len()))
 }
 
 /// A node's own transform: `matrix`, or translation · rotation · scale.
