@@ -383,3 +383,6 @@ pub struct BlockResult {
     /// Paths that were ended in this block (samples).
     pub samples: u32,
 }
+
+/// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
+pub const LANE_STATE_BYTES: usize = 256;

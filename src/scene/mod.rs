@@ -5,6 +5,7 @@
 
 pub mod builtin;
 mod camera;
+mod complete;
 mod environment;
 mod error;
 mod light;
@@ -12,6 +13,7 @@ pub mod load;
 mod material;
 mod mesh;
 mod texture;
+mod validate;
 
 pub use camera::{Camera, Projection};
 pub use environment::Environment;
@@ -44,4 +46,6 @@ pub struct Scene {
     pub environment: Environment,
     /// What the loader met and could not honour, one line each, for the user.
     pub warnings: Vec<String>,
+    /// What was added because the file lacks it (a camera, an environment), one line each, for the user.
+    pub notes: Vec<String>,
 }

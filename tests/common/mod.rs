@@ -1,5 +1,6 @@
 //! What the integration tests share.
 #![allow(dead_code, unreachable_pub, reason = "every test binary compiles this module and uses a part of it")]
 
+pub mod gpu;
 pub mod reference;
 pub mod statistics;

@@ -1,0 +1,43 @@
+// What a scene and its settings need: specialisation constants, so that the rest leaves no code behind. The host's side
+// is src/gpu/kernel.rs. The defaults switch everything on.
+#ifndef FEATURES_GLSL
+#define FEATURES_GLSL
+
+layout(constant_id = 2) const uint BSDFS = 0x3fu;
+layout(constant_id = 3) const uint LIGHTS = 0x1fu;
+layout(constant_id = 4) const uint FEATURES = 0xffffffffu;
+layout(constant_id = 5) const uint INTEGRATOR = 7u;
+layout(constant_id = 6) const uint LIGHT_SAMPLING = 0u;
+layout(constant_id = 7) const uint MIS_HEURISTIC = 1u;
+layout(constant_id = 8) const uint ENVIRONMENT_SAMPLING = 0u;
+layout(constant_id = 9) const uint STACK_SIZE = 64u;
+
+const bool HAS_TEXTURES = (FEATURES & 1u) != 0u;
+const bool HAS_INSTANCES = (FEATURES & 2u) != 0u;
+const bool HAS_NORMALS = (FEATURES & 4u) != 0u;
+const bool HAS_CONSTANT_ENVIRONMENT = (FEATURES & 8u) != 0u;
+const bool HAS_IMAGE_ENVIRONMENT = (FEATURES & 16u) != 0u;
+const bool HAS_LENS = (FEATURES & 32u) != 0u;
+const bool HAS_ORTHOGRAPHIC = (FEATURES & 64u) != 0u;
+const bool HAS_BLACK_BACKS = (FEATURES & 128u) != 0u;
+
+#define HAS_BSDF(kind) ((BSDFS & (1u << (kind))) != 0u)
+#define HAS_LIGHT(kind) ((LIGHTS & (1u << (kind))) != 0u)
+
+// Which scattering counts the image adds up.
+const bool ADDS_EMISSION = (INTEGRATOR & 1u) != 0u;
+const bool ADDS_DIRECT = (INTEGRATOR & 2u) != 0u;
+const bool ADDS_INDIRECT = (INTEGRATOR & 4u) != 0u;
+
+const uint LIGHT_SAMPLING_MIS = 0u;
+const uint LIGHT_SAMPLING_MIXTURE = 1u;
+const uint LIGHT_SAMPLING_NEE = 2u;
+const uint LIGHT_SAMPLING_BSDF = 3u;
+
+const uint MIS_BALANCE = 0u;
+const uint MIS_POWER = 1u;
+
+const uint ENVIRONMENT_SAMPLING_IMPORTANCE = 0u;
+const uint ENVIRONMENT_SAMPLING_UNIFORM = 1u;
+
+#endif

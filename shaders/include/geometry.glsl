@@ -1,0 +1,111 @@
+// The surface at a hit: position with a bound on its error, normals, texture coordinates, material.
+#ifndef GEOMETRY_GLSL
+#define GEOMETRY_GLSL
+#include "features.glsl"
+#include "records.glsl"
+#include "trace.glsl"
+
+struct TriangleVertices {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    uint triangle;  // index of its Triangle record
+    uint light;     // its light, relative to the instance's first; NONE if it does not emit
+    uint material;
+};
+
+TriangleVertices load_triangle(uint slot) {
+    uint base = slot * SLOT_TEXELS;
+    uvec4 q0 = LOAD4(SLOTS, base);
+    uvec4 q1 = LOAD4(SLOTS, base + 1u);
+    uvec4 q2 = LOAD4(SLOTS, base + 2u);
+    return TriangleVertices(uintBitsToFloat(q0.xyz), uintBitsToFloat(uvec3(q0.w, q1.xy)),
+                            uintBitsToFloat(uvec3(q1.zw, q2.x)), q2.y, q2.z, q2.w & SLOT_MATERIAL_MASK);
+}
+
+// A point of a triangle in world space.
+struct SurfacePoint {
+    vec3 position;
+    vec3 error;             // bound on the absolute error of each coordinate
+    vec3 geometric_normal;  // unit, on the front
+    float area;             // of the triangle, in world space
+};
+
+// The point with the given weights of the second and third vertex. Errors as in pbrt-v4 (PBR, 4th ed., §6.8.4).
+SurfacePoint surface_point(RenderConstants constants, TriangleVertices vertices, uint instance, vec2 barycentric) {
+    float b0 = 1.0 - barycentric.x - barycentric.y;
+    vec3 pa = vertices.a * b0;
+    vec3 pb = vertices.b * barycentric.x;
+    vec3 pc = vertices.c * barycentric.y;
+    SurfacePoint point;
+    point.position = pa + pb + pc;
+    point.error = (abs(pa) + abs(pb) + abs(pc)) * GAMMA(7);
+    vec3 ab = vertices.b - vertices.a;
+    vec3 ac = vertices.c - vertices.a;
+    if (HAS_INSTANCES && instance != NONE) {
+        Affine m = load_object_to_world(constants, instance);
+        vec3 p = point.position;
+        vec3 magnitude = vec3(dot(abs(m.x.xyz), abs(p)) + abs(m.x.w), dot(abs(m.y.xyz), abs(p)) + abs(m.y.w),
+                              dot(abs(m.z.xyz), abs(p)) + abs(m.z.w));
+        vec3 carried = vec3(dot(abs(m.x.xyz), point.error), dot(abs(m.y.xyz), point.error),
+                            dot(abs(m.z.xyz), point.error));
+        point.position = transform_point(m, p);
+        point.error = magnitude * GAMMA(4) + carried * (1.0 + GAMMA(4));
+        ab = transform_vector(m, ab);
+        ac = transform_vector(m, ac);
+    }
+    vec3 normal = cross(ab, ac);
+    float scale = max_component(abs(normal));
+    vec3 scaled = normal / scale;
+    float length_scaled = sqrt(dot(scaled, scaled));
+    point.area = 0.5 * scale * length_scaled;
+    point.geometric_normal = scaled / length_scaled;
+    if (HAS_INSTANCES && instance != NONE && load_instance_header(constants, instance).z != 0u)
+        point.geometric_normal = -point.geometric_normal;
+    return point;
+}
+
+// The origin of a ray that leaves the point to the side of `direction`: moved along the normal by the position's error,
+// then each coordinate rounded away from the surface (PBR, 4th ed., §6.8.6).
+vec3 offset_origin(SurfacePoint point, vec3 direction) {
+    float side = dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
+    vec3 offset = point.geometric_normal * (side * dot(abs(point.geometric_normal), point.error));
+    vec3 p = point.position + offset;
+    return vec3(offset.x > 0.0 ? next_float_up(p.x) : (offset.x < 0.0 ? next_float_down(p.x) : p.x),
+                offset.y > 0.0 ? next_float_up(p.y) : (offset.y < 0.0 ? next_float_down(p.y) : p.y),
+                offset.z > 0.0 ? next_float_up(p.z) : (offset.z < 0.0 ? next_float_down(p.z) : p.z));
+}
+
+struct Vertices {
+    vec3 normal;    // interpolated unit shading normal in world space; zero if the triangle is flat
+    vec2 texcoord;  // interpolated; zero if there are none
+};
+
+Vertices interpolate_vertices(RenderConstants constants, uint triangle, uint instance, vec2 barycentric) {
+    Vertices result = Vertices(vec3(0.0), vec2(0.0));
+    if (!HAS_NORMALS && !HAS_TEXTURES) return result;
+    uvec4 record = LOAD4(ATTRIBUTES, triangle);
+    if (record.w == 0u) return result;
+    vec3 weights = vec3(1.0 - barycentric.x - barycentric.y, barycentric);
+    uvec3 first = constants.vertices + record.xyz * VERTEX_TEXELS;
+    vec4 a = uintBitsToFloat(LOAD4(ATTRIBUTES, first.x));
+    vec4 b = uintBitsToFloat(LOAD4(ATTRIBUTES, first.y));
+    vec4 c = uintBitsToFloat(LOAD4(ATTRIBUTES, first.z));
+    vec4 mixed = a * weights.x + b * weights.y + c * weights.z;
+    if (HAS_NORMALS && (record.w & TRIANGLE_NORMALS) != 0u) {
+        vec3 normal = mixed.xyz;
+        if (HAS_INSTANCES && instance != NONE)
+            normal = transform_transposed(load_world_to_object(constants, instance), normal);
+        // Opposite vertex normals can cancel: then the triangle is flat there.
+        if (max_component(abs(normal)) > 0.0) result.normal = safe_normalize(normal);
+    }
+    if (HAS_TEXTURES && (record.w & TRIANGLE_TEXCOORDS) != 0u) {
+        float va = uintBitsToFloat(LOAD4(ATTRIBUTES, first.x + 1u).x);
+        float vb = uintBitsToFloat(LOAD4(ATTRIBUTES, first.y + 1u).x);
+        float vc = uintBitsToFloat(LOAD4(ATTRIBUTES, first.z + 1u).x);
+        result.texcoord = vec2(mixed.w, va * weights.x + vb * weights.y + vc * weights.z);
+    }
+    return result;
+}
+
+#endif

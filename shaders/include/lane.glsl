@@ -1,0 +1,92 @@
+// The state of a lane: its path, and the sums of its block. It survives a dispatch.
+#ifndef LANE_GLSL
+#define LANE_GLSL
+
+// How emission found by the path's ray counts.
+const uint WEIGHT_FULL = 0u;    // all of it: seen by the camera, after a delta lobe, or light sampling is off
+const uint WEIGHT_SHARED = 1u;  // weighted against light sampling
+const uint WEIGHT_NONE = 2u;    // none of what light sampling reaches
+
+struct LaneState {
+    Ray ray;
+    uint pixel;
+    uint sample_index;
+    uint end_sample;
+    uint bounce;           // scattering events so far
+    vec3 throughput;
+    float radiance_scale;  // product of η² of the boundaries crossed, which roulette takes out of the throughput
+    vec3 radiance;         // of the current sample
+    float pdf;             // density of the last scattering direction
+    vec3 shadow_light;     // added if the shadow ray is free
+    uint emission_weight;
+    vec3 next_origin;      // the scattered ray, while the shadow ray is traced
+    uint path_ends;
+    vec3 next_direction;
+    uint rays;
+    TriangleId next_from;
+    uint non_finite;
+    uint capped;
+    vec3 sum;              // of the block; the exact sum is sum + compensation
+    float luminance_squared;
+    vec3 compensation;
+    uint samples;
+};
+
+// Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
+uvec2 pixel_of_index(RenderConstants constants, uint index) {
+    uint tiles_across = (constants.width + 7u) / 8u;
+    uint tile = index / 64u;
+    uint inside = index % 64u;
+    return uvec2(tile % tiles_across, tile / tiles_across) * 8u + uvec2(inside % 8u, inside / 8u);
+}
+
+LaneState new_lane(RenderConstants constants, SliceConstants slice, uint index) {
+    uint pixels = ((constants.width + 7u) / 8u) * ((constants.height + 7u) / 8u) * 64u;
+    uint atom = slice.first_atom + index;
+    uvec2 pixel = pixel_of_index(constants, atom % pixels);
+    uint first = (slice.first_block + atom / pixels) * BLOCK_SAMPLES;
+    bool outside = pixel.x >= constants.width || pixel.y >= constants.height;
+    LaneState lane;
+    lane.ray = Ray(vec3(0.0), vec3(0.0), 0.0, false, NO_TRIANGLE, NO_TRIANGLE);
+    lane.pixel = pixel.x | pixel.y << 16u;
+    lane.sample_index = max(first, constants.first_sample);
+    // The last block may end at sample index 2^32 − 1.
+    lane.end_sample = outside ? lane.sample_index : first + min(BLOCK_SAMPLES, constants.end_sample - first);
+    lane.bounce = 0u;
+    lane.throughput = vec3(1.0);
+    lane.radiance_scale = 1.0;
+    lane.radiance = vec3(0.0);
+    lane.pdf = 0.0;
+    lane.shadow_light = vec3(0.0);
+    lane.emission_weight = WEIGHT_FULL;
+    lane.next_origin = vec3(0.0);
+    lane.path_ends = 0u;
+    lane.next_direction = vec3(0.0);
+    lane.rays = 0u;
+    lane.next_from = NO_TRIANGLE;
+    lane.non_finite = 0u;
+    lane.capped = 0u;
+    lane.sum = vec3(0.0);
+    lane.luminance_squared = 0.0;
+    lane.compensation = vec3(0.0);
+    lane.samples = 0u;
+    return lane;
+}
+
+// Adds to the block's sum without losing what rounding cuts off (Knuth's TwoSum): the sum of the integrators' images is
+// then the image to the last bit. An infinite sum would make the compensation NaN; the sum alone says it then.
+void accumulate(inout LaneState lane, vec3 light) {
+    precise vec3 total = lane.sum + light;
+    precise vec3 part = total - lane.sum;
+    precise vec3 lost = (lane.sum - (total - part)) + (light - part);
+    lane.sum = total;
+    lane.compensation += lost;
+}
+
+BlockResult block_result(LaneState lane, bool complete) {
+    return BlockResult(lane.sum.x, lane.sum.y, lane.sum.z, lane.luminance_squared, lane.compensation.x,
+                       lane.compensation.y, lane.compensation.z, lane.rays, lane.non_finite, lane.capped,
+                       complete ? 1u : 0u, lane.samples);
+}
+
+#endif

@@ -1,0 +1,144 @@
+// Every struct and constant shared with the host. The other half is src/layout.rs, where each field is documented;
+// tests/layout.rs holds the two together.
+#ifndef LAYOUT_GLSL
+#define LAYOUT_GLSL
+
+const uint NONE = 0xffffffffu;
+
+const uint SLOT_LEAF = 0x80000000u;
+const uint SLOT_INSTANCE = 0x40000000u;
+const uint SLOT_MATERIAL_MASK = 0x00ffffffu;
+const uint SLOT_GROUP = 4u;
+const uint SLOT_TEXELS = 3u;
+
+const uint TRIANGLE_NORMALS = 1u;
+const uint TRIANGLE_TEXCOORDS = 2u;
+const uint VERTEX_TEXELS = 2u;
+
+const uint BSDF_LAMBERTIAN = 0u;
+const uint BSDF_MIRROR = 1u;
+const uint BSDF_REFRACT = 2u;
+const uint BSDF_GLASS = 3u;
+const uint BSDF_METALLIC_ROUGHNESS = 4u;
+const uint BSDF_UNLIT = 5u;
+const uint MATERIAL_KIND_MASK = 0xffu;
+const uint MATERIAL_DOUBLE_SIDED = 0x100u;
+const uint MATERIAL_BLACK_BACK = 0x200u;
+const uint MATERIAL_SCHLICK = 0x400u;
+const uint MATERIAL_TEXELS = 4u;
+
+const uint TEXTURE_SRGB = 1u;
+const uint TEXTURE_16_BIT = 2u;
+const uint TEXTURE_NEAREST = 4u;
+const uint TEXTURE_WRAP_U_SHIFT = 4u;
+const uint TEXTURE_WRAP_V_SHIFT = 6u;
+
+const uint LIGHT_TRIANGLE = 0u;
+const uint LIGHT_POINT = 1u;
+const uint LIGHT_SPOT = 2u;
+const uint LIGHT_DIRECTIONAL = 3u;
+const uint LIGHT_ENVIRONMENT = 4u;
+const uint LIGHT_TEXELS = 4u;
+
+const uint INSTANCE_TEXELS = 7u;
+const uint CDF_TOTAL = 0x80000000u;
+
+const uint PROJECTION_PERSPECTIVE = 0u;
+const uint PROJECTION_ORTHOGRAPHIC = 1u;
+
+const uint BLOCK_SAMPLES = 16u;
+
+struct RenderConstants {
+    vec3 camera_origin;
+    float lens_radius;
+    vec3 camera_right;
+    float focus_distance;
+    vec3 camera_up;
+    uint projection;
+    vec3 camera_forward;
+    float unused;
+    uint width;
+    uint height;
+    uint seed;
+    uint max_bounces;
+    uint first_sample;
+    uint end_sample;
+    uint vertices;
+    uint root_slot;
+    uint materials;
+    uint textures;
+    uint lights;
+    uint instances;
+    uint light_cdf_word;
+    uint light_count;
+    uint environment_light;
+    uint environment_width;
+    uint environment_height;
+    uint environment_marginal_word;
+    uint environment_conditional_word;
+    uint unused_too;
+    vec3 environment_radiance;
+    float environment_cos;
+    vec3 scene_center;
+    float environment_sin;
+};
+
+struct SliceConstants {
+    uint first_atom;
+    uint lanes;
+    uint first_block;
+    uint ray_budget;
+    uint resume;
+    uint unused_0;
+    uint unused_1;
+    uint unused_2;
+};
+
+struct BlockResult {
+    float sum_r;
+    float sum_g;
+    float sum_b;
+    float luminance_squared;
+    float compensation_r;
+    float compensation_g;
+    float compensation_b;
+    uint rays;
+    uint non_finite;
+    uint capped;
+    uint complete;
+    uint samples;
+};
+
+// Scene-array records, decoded from texels by records.glsl.
+struct Material {
+    vec3 base_color;
+    uint kind_flags;
+    vec3 emission;
+    float roughness;
+    float metallic;
+    float ior;
+    float transmission;
+    uint base_color_texture;
+    uint metallic_roughness_texture;
+    uint emission_texture;
+};
+
+struct TextureHeader {
+    uint first_word;
+    uint width;
+    uint height;
+    uint sampling;
+};
+
+struct Light {
+    vec3 position;
+    uint kind;
+    vec3 intensity;
+    uint slot;
+    vec3 direction;
+    uint instance;
+    float cone_scale;
+    float cone_offset;
+};
+
+#endif

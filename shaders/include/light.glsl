@@ -1,0 +1,85 @@
+// Sampling of lights: one is picked by the CDF over their power, then a point or direction of it.
+#ifndef LIGHT_GLSL
+#define LIGHT_GLSL
+#include "cdf.glsl"
+#include "environment.glsl"
+#include "geometry.glsl"
+#include "texture.glsl"
+
+struct LightSample {
+    vec3 direction;      // unit, towards the light
+    float distance;      // infinite for directional lights and the environment
+    vec3 radiance;       // radiance / pdf, or for a delta light its irradiance facing it / probability of the pick
+    float pdf;           // per solid angle, the pick included; 0 for a delta light
+    TriangleId triangle; // of an emissive triangle
+};
+const LightSample NO_LIGHT = LightSample(vec3(0.0), 0.0, vec3(0.0), 0.0, NO_TRIANGLE);
+
+bool scene_has_lights() { return LIGHTS != 0u; }
+
+float light_pick_probability(RenderConstants constants, uint light) {
+    return cdf_probability_TABLES(constants.light_cdf_word, light);
+}
+
+// Emission of a triangle towards a direction on its front (`front`) or back.
+bool emits_to_side(Material material, bool front) {
+    return front || (material.kind_flags & MATERIAL_DOUBLE_SIDED) != 0u;
+}
+
+// Uniform by area. `from` is the origin of the shadow ray.
+LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 from, vec2 u, float pick) {
+    TriangleVertices vertices = load_triangle(light.slot);
+    float root = sqrt(u.x);
+    vec2 barycentric = vec2(root * (1.0 - u.y), root * u.y);
+    SurfacePoint point = surface_point(constants, vertices, light.instance, barycentric);
+    vec3 offset = point.position - from;
+    float scale = max_component(abs(offset));
+    if (scale == 0.0) return NO_LIGHT;
+    vec3 direction = safe_normalize(offset);
+    float distance = dot(offset, direction);
+    float cosine = -dot(direction, point.geometric_normal);
+    Material material = load_material(constants, vertices.material);
+    if (cosine == 0.0 || !emits_to_side(material, cosine > 0.0)) return NO_LIGHT;
+    vec2 uv = HAS_TEXTURES ? interpolate_vertices(constants, vertices.triangle, light.instance, barycentric).texcoord
+                           : vec2(0.0);
+    float pdf = pick / point.area * (distance * distance) / abs(cosine);
+    return LightSample(direction, distance, material_emission(constants, material, uv) / pdf, pdf,
+                       TriangleId(light.slot, light.instance));
+}
+
+// Density with which light sampling from `distance` away along unit `direction` draws the point.
+float triangle_light_pdf(RenderConstants constants, uint light, SurfacePoint point, vec3 direction, float distance) {
+    return light_pick_probability(constants, light) / point.area * (distance * distance) /
+           abs(dot(direction, point.geometric_normal));
+}
+
+// Point and spot lights (KHR_lights_punctual).
+LightSample sample_positional_light(Light light, vec3 from, float pick) {
+    vec3 offset = light.position - from;
+    if (max_component(abs(offset)) == 0.0) return NO_LIGHT;
+    vec3 direction = safe_normalize(offset);
+    float distance = dot(offset, direction);
+    vec3 intensity = light.intensity;
+    if (HAS_LIGHT(LIGHT_SPOT) && light.kind == LIGHT_SPOT)
+        intensity *= sqr(clamp(-dot(direction, light.direction) * light.cone_scale + light.cone_offset, 0.0, 1.0));
+    return LightSample(direction, distance, intensity / (distance * distance) / pick, 0.0, NO_TRIANGLE);
+}
+
+// `bits`: which light, position u, v. `environment_bits`: see environment_sample.
+LightSample sample_light(RenderConstants constants, vec3 from, uvec3 bits, uvec4 environment_bits) {
+    CdfSample pick = cdf_sample_TABLES(constants.light_cdf_word, constants.light_count, bits.x);
+    Light light = load_light(constants, pick.index);
+    if (HAS_LIGHT(LIGHT_TRIANGLE) && light.kind == LIGHT_TRIANGLE)
+        return sample_triangle_light(constants, light, from, vec2(to_unit(bits.y), to_unit(bits.z)), pick.probability);
+    if (HAS_LIGHT(LIGHT_ENVIRONMENT) && light.kind == LIGHT_ENVIRONMENT) {
+        EnvironmentSample s = environment_sample(constants, environment_bits);
+        float pdf = s.pdf * pick.probability;
+        return LightSample(s.direction, INFINITY, s.radiance / pdf, pdf, NO_TRIANGLE);
+    }
+    if (HAS_LIGHT(LIGHT_DIRECTIONAL) && light.kind == LIGHT_DIRECTIONAL)
+        return LightSample(-light.direction, INFINITY, light.intensity / pick.probability, 0.0, NO_TRIANGLE);
+    if (HAS_LIGHT(LIGHT_POINT) || HAS_LIGHT(LIGHT_SPOT)) return sample_positional_light(light, from, pick.probability);
+    return NO_LIGHT;
+}
+
+#endif

@@ -1,0 +1,78 @@
+// Records of the scene arrays, decoded.
+#ifndef RECORDS_GLSL
+#define RECORDS_GLSL
+#include "layout.glsl"
+#include "arrays.glsl"
+#include "math.glsl"
+
+Material load_material(RenderConstants constants, uint index) {
+    uint base = constants.materials + index * MATERIAL_TEXELS;
+    uvec4 a = LOAD4(TABLES, base);
+    uvec4 b = LOAD4(TABLES, base + 1u);
+    uvec4 c = LOAD4(TABLES, base + 2u);
+    uvec4 d = LOAD4(TABLES, base + 3u);
+    Material m;
+    m.base_color = uintBitsToFloat(a.xyz);
+    m.kind_flags = a.w;
+    m.emission = uintBitsToFloat(b.xyz);
+    m.roughness = uintBitsToFloat(b.w);
+    m.metallic = uintBitsToFloat(c.x);
+    m.ior = uintBitsToFloat(c.y);
+    m.transmission = uintBitsToFloat(c.z);
+    m.base_color_texture = c.w;
+    m.metallic_roughness_texture = d.x;
+    m.emission_texture = d.y;
+    return m;
+}
+
+TextureHeader load_texture_header(RenderConstants constants, uint index) {
+    uvec4 a = LOAD4(TABLES, constants.textures + index);
+    return TextureHeader(a.x, a.y, a.z, a.w);
+}
+
+Light load_light(RenderConstants constants, uint index) {
+    uint base = constants.lights + index * LIGHT_TEXELS;
+    uvec4 a = LOAD4(TABLES, base);
+    uvec4 b = LOAD4(TABLES, base + 1u);
+    uvec4 c = LOAD4(TABLES, base + 2u);
+    uvec4 d = LOAD4(TABLES, base + 3u);
+    Light light;
+    light.position = uintBitsToFloat(a.xyz);
+    light.kind = a.w;
+    light.intensity = uintBitsToFloat(b.xyz);
+    light.slot = b.w;
+    light.direction = uintBitsToFloat(c.xyz);
+    light.instance = c.w;
+    light.cone_scale = uintBitsToFloat(d.x);
+    light.cone_offset = uintBitsToFloat(d.y);
+    return light;
+}
+
+// A 3×4 affine matrix as three rows.
+struct Affine {
+    vec4 x;
+    vec4 y;
+    vec4 z;
+};
+
+Affine load_object_to_world(RenderConstants constants, uint instance) {
+    uint base = constants.instances + instance * INSTANCE_TEXELS;
+    return Affine(uintBitsToFloat(LOAD4(TABLES, base)), uintBitsToFloat(LOAD4(TABLES, base + 1u)),
+                  uintBitsToFloat(LOAD4(TABLES, base + 2u)));
+}
+Affine load_world_to_object(RenderConstants constants, uint instance) {
+    uint base = constants.instances + instance * INSTANCE_TEXELS + 3u;
+    return Affine(uintBitsToFloat(LOAD4(TABLES, base)), uintBitsToFloat(LOAD4(TABLES, base + 1u)),
+                  uintBitsToFloat(LOAD4(TABLES, base + 2u)));
+}
+// (root slot, first light, mirrored, unused)
+uvec4 load_instance_header(RenderConstants constants, uint instance) {
+    return LOAD4(TABLES, constants.instances + instance * INSTANCE_TEXELS + 6u);
+}
+
+vec3 transform_vector(Affine m, vec3 v) { return vec3(dot(m.x.xyz, v), dot(m.y.xyz, v), dot(m.z.xyz, v)); }
+vec3 transform_point(Affine m, vec3 p) { return transform_vector(m, p) + vec3(m.x.w, m.y.w, m.z.w); }
+// The transpose: carries normals when m is the inverse of the points' transform.
+vec3 transform_transposed(Affine m, vec3 n) { return m.x.xyz * n.x + m.y.xyz * n.y + m.z.xyz * n.z; }
+
+#endif

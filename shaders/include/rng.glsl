@@ -1,0 +1,45 @@
+// The sampler: a pure function of (pixel, sample index, bounce, named dimension, seed). Dimension numbers never move,
+// whatever a scene uses or a kernel drops.
+#ifndef RNG_GLSL
+#define RNG_GLSL
+
+// Groups of four dimensions. Camera groups stand at bounce 0; the others at the number of the scattering event.
+const uint DIMENSIONS_FILM = 0u;     // x, y in the pixel; lens u, v
+const uint DIMENSIONS_TIME = 1u;     // time; filter; two in reserve
+const uint DIMENSIONS_SCATTER = 2u;  // lobe; direction u, v; roulette
+const uint DIMENSIONS_LIGHT = 3u;    // which light; position u, v; which strategy (mixture)
+const uint DIMENSIONS_ENVIRONMENT = 4u;  // row; column; position u, v in the texel
+const uint DIMENSIONS_ALPHA = 5u;    // reserved for decisions about alpha
+const uint DIMENSION_GROUPS = 8u;
+
+struct SampleKey {
+    uint pixel;  // x | y << 16
+    uint index;
+    uint seed;
+};
+
+// Jarzynski and Olano 2020, "Hash Functions for GPU Rendering": the four-dimensional PCG hash.
+uvec4 pcg4d(uvec4 v) {
+    v = v * 1664525u + 1013904223u;
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    v ^= v >> 16u;
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    return v;
+}
+
+// Four 32-bit values of a group of dimensions at a bounce.
+uvec4 sample_bits(SampleKey key, uint bounce, uint group) {
+    return pcg4d(uvec4(key.pixel, key.index, bounce * DIMENSION_GROUPS + group, key.seed));
+}
+
+// [0, 1), in steps of 2^-24.
+float to_unit(uint bits) { return float(bits >> 8u) * 5.9604644775390625e-8; }
+vec4 to_unit(uvec4 bits) { return vec4(bits >> 8u) * 5.9604644775390625e-8; }
+
+#endif

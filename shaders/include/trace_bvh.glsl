@@ -1,0 +1,254 @@
+// The trace interface over our own BVH: four-wide quantised nodes, incremental (a step visits one slot), two levels.
+//
+// The traversal keeps for each inner node that still has children to visit one entry: its child group, and the ordered
+// list of those children, two bits each below a leading one. The newest entry is `top`; the next four stay in registers
+// (a store at a divergent address costs a branch a lane on software devices), the rest in memory.
+#include "features.glsl"
+#include "records.glsl"
+
+const uint LIST_BITS = 7u;
+const uint LIST_MASK = (1u << LIST_BITS) - 1u;
+// Below this entry lies the world level; it stands for "leave the instance". No group is that large.
+const uint LEAVE_INSTANCE = 0xffffff80u;
+
+struct Trace {
+    vec3 origin;  // the ray in the space of `instance`
+    vec3 direction;
+    vec3 inverse_direction;
+    Hit hit;
+    uint current;   // slot to visit, NONE when done
+    uint instance;  // the instance being traversed, NONE at the world level
+    uint top;       // newest entry, 0 if there is none
+    uint entry_0;
+    uint entry_1;
+    uint entry_2;
+    uint entry_3;
+    uint depth;  // entries in memory
+    bool any_hit;
+    TriangleId from;
+    TriangleId towards;
+    vec3 world_origin;
+    vec3 world_direction;
+};
+
+uint trace_stack[STACK_SIZE];
+
+void push_entry(inout Trace trace, uint entry) {
+    if (trace.entry_3 != 0u) trace_stack[trace.depth++] = trace.entry_3;
+    trace.entry_3 = trace.entry_2;
+    trace.entry_2 = trace.entry_1;
+    trace.entry_1 = trace.entry_0;
+    trace.entry_0 = entry;
+}
+
+uint pop_entry(inout Trace trace) {
+    uint entry = trace.entry_0;
+    trace.entry_0 = trace.entry_1;
+    trace.entry_1 = trace.entry_2;
+    trace.entry_2 = trace.entry_3;
+    trace.entry_3 = 0u;
+    // Entries spill one by one, so memory holds any only while all four registers were full: refill at the end.
+    if (trace.depth > 0u) trace.entry_3 = trace_stack[--trace.depth];
+    return entry;
+}
+
+// 1/d for the slab test. A component below 2^-80 counts as 2^-80: the slack of the slab test (see visit_inner) then spans
+// 2^60 times the box, so that no box around the ray's plane is missed, and no product overflows below 2^47 metres.
+vec3 slab_inverse(vec3 d) {
+    const float SMALLEST = 8.271806125530277e-25;
+    vec3 magnitude = max(abs(d), vec3(SMALLEST));
+    return vec3(d.x < 0.0 ? -1.0 : 1.0, d.y < 0.0 ? -1.0 : 1.0, d.z < 0.0 ? -1.0 : 1.0) / magnitude;
+}
+
+void set_ray(inout Trace trace, vec3 origin, vec3 direction) {
+    trace.origin = origin;
+    trace.direction = direction;
+    trace.inverse_direction = slab_inverse(direction);
+}
+
+void trace_begin(out Trace trace, RenderConstants constants, Ray ray) {
+    set_ray(trace, ray.origin, ray.direction);
+    trace.hit = Hit(NO_TRIANGLE, ray.t_max, vec2(0.0));
+    trace.current = ray_is_valid(ray) ? constants.root_slot : NONE;
+    trace.instance = NONE;
+    trace.top = 0u;
+    trace.entry_0 = 0u;
+    trace.entry_1 = 0u;
+    trace.entry_2 = 0u;
+    trace.entry_3 = 0u;
+    trace.depth = 0u;
+    trace.any_hit = ray.any_hit;
+    trace.from = ray.from;
+    trace.towards = ray.towards;
+    trace.world_origin = ray.origin;
+    trace.world_direction = ray.direction;
+}
+
+bool trace_done(Trace trace) { return trace.current == NONE; }
+Hit trace_hit(Trace trace) { return trace.hit; }
+
+// Child k's byte of a word of bounds, as a float.
+float bound_0(uint word) { return float(word & 255u); }
+float bound_1(uint word) { return float((word >> 8u) & 255u); }
+float bound_2(uint word) { return float((word >> 16u) & 255u); }
+float bound_3(uint word) { return float(word >> 24u); }
+
+const int MISSED = 0x7fffffff;
+
+// Distances to the near and far planes; comparing their bits as integers is right for non-negative floats, and a negative
+// far plane is a negative integer. The child's number rides in the low bits of the key.
+#define CHILD_KEY(bound, k, key)                                                                                   \
+    {                                                                                                              \
+        int near_t = max(max(floatBitsToInt(bound(near_x) * scale.x + near_offset.x),                              \
+                             floatBitsToInt(bound(near_y) * scale.y + near_offset.y)),                             \
+                         max(floatBitsToInt(bound(near_z) * scale.z + near_offset.z), 0));                         \
+        int far_t = min(min(floatBitsToInt(bound(far_x) * scale.x + far_offset.x),                                 \
+                            floatBitsToInt(bound(far_y) * scale.y + far_offset.y)),                                \
+                        min(floatBitsToInt(bound(far_z) * scale.z + far_offset.z), t_max));                        \
+        key = near_t <= far_t ? ((near_t & ~3) | k) : MISSED;                                                      \
+    }
+#define SORT_PAIR(a, b)      \
+    {                        \
+        int smaller = min(a, b); \
+        b = max(a, b);       \
+        a = smaller;         \
+    }
+
+// Visits an inner slot: the nearest child that the ray meets becomes `next`, the others an entry (0 if there are none).
+//
+// The plane at origin + q·step is met at t = (q·step + (origin − o)) / d. With u = 2^-24, the computed q·scale + offset
+// differs from it by at most 8u·(|q·scale| + |offset|): one rounding of the difference, 2.5 ulp of the division and one
+// rounding of the product for the offset; the same division, a product and a product for the scale; and the sum. The
+// slabs are widened by 16u·(255·|scale| + |offset|), so a box that the ray meets is never missed.
+void visit_inner(Trace trace, uvec4 q0, uvec4 q1, uvec4 q2, out uint next, out uint entry) {
+    vec3 grid_step = uintBitsToFloat((uvec3(q0.w, q0.w >> 8u, q0.w >> 16u) & 255u) << 23u);
+    vec3 scale = grid_step * trace.inverse_direction;
+    vec3 offset = (uintBitsToFloat(q0.xyz) - trace.origin) * trace.inverse_direction;
+    vec3 slack = (abs(scale) * 255.0 + abs(offset)) * (16.0 * UNIT_ROUNDOFF);
+    vec3 near_offset = offset - slack;
+    vec3 far_offset = offset + slack;
+    bvec3 reversed = lessThan(trace.inverse_direction, vec3(0.0));
+    uint near_x = reversed.x ? q1.w : q1.x;
+    uint far_x = reversed.x ? q1.x : q1.w;
+    uint near_y = reversed.y ? q2.x : q1.y;
+    uint far_y = reversed.y ? q1.y : q2.x;
+    uint near_z = reversed.z ? q2.y : q1.z;
+    uint far_z = reversed.z ? q1.z : q2.y;
+    int t_max = floatBitsToInt(trace.hit.t);
+    int key_0, key_1, key_2, key_3;
+    CHILD_KEY(bound_0, 0, key_0)
+    CHILD_KEY(bound_1, 1, key_1)
+    CHILD_KEY(bound_2, 2, key_2)
+    CHILD_KEY(bound_3, 3, key_3)
+    SORT_PAIR(key_0, key_1)
+    SORT_PAIR(key_2, key_3)
+    SORT_PAIR(key_0, key_2)
+    SORT_PAIR(key_1, key_3)
+    SORT_PAIR(key_1, key_2)
+    uint list_bits = (key_1 != MISSED ? 2u : 0u) + (key_2 != MISSED ? 2u : 0u) + (key_3 != MISSED ? 2u : 0u);
+    uint list = uint(key_1 & 3) | uint(key_2 & 3) << 2u | uint(key_3 & 3) << 4u;
+    uint leading_one = 1u << list_bits;
+    entry = list_bits != 0u ? (q2.z << LIST_BITS | leading_one | (list & (leading_one - 1u))) : 0u;
+    next = key_0 != MISSED ? (q2.z << 2u | uint(key_0 & 3)) : NONE;
+}
+
+// The axis of the largest component, and v rotated so that it is the last.
+vec3 rotate_axis(vec3 v, bool x_largest, bool y_largest) { return x_largest ? v.yzx : (y_largest ? v.zxy : v); }
+
+// Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": vertices are sheared into ray space, each by the
+// same operations wherever it is shared, and edges are tested there by differences of products. Rounding is monotonic, so
+// a computed edge function never has the wrong sign, it can only be zero; zero counts as inside. Hence a closed mesh has
+// no gap. `precise` keeps the compiler from fusing, which would break the symmetry between neighbours.
+void visit_leaf(inout Trace trace, uvec4 q0, uvec4 q1, uvec4 q2) {
+    vec3 magnitude = abs(trace.direction);
+    bool x_largest = magnitude.x > magnitude.y && magnitude.x > magnitude.z;
+    bool y_largest = !x_largest && magnitude.y > magnitude.z;
+    vec3 d = rotate_axis(trace.direction, x_largest, y_largest);
+    precise float shear_z = 1.0 / d.z;
+    precise float shear_x = d.x * shear_z;
+    precise float shear_y = d.y * shear_z;
+    precise vec3 a = rotate_axis(uintBitsToFloat(q0.xyz) - trace.origin, x_largest, y_largest);
+    precise vec3 b = rotate_axis(uintBitsToFloat(uvec3(q0.w, q1.xy)) - trace.origin, x_largest, y_largest);
+    precise vec3 c = rotate_axis(uintBitsToFloat(uvec3(q1.zw, q2.x)) - trace.origin, x_largest, y_largest);
+    precise float ax = a.x - shear_x * a.z;
+    precise float ay = a.y - shear_y * a.z;
+    precise float bx = b.x - shear_x * b.z;
+    precise float by = b.y - shear_y * b.z;
+    precise float cx = c.x - shear_x * c.z;
+    precise float cy = c.y - shear_y * c.z;
+    precise float u = cx * by - cy * bx;
+    precise float v = ax * cy - ay * cx;
+    precise float w = bx * ay - by * ax;
+    precise float determinant = u + v + w;
+    precise float scaled_t = (u * a.z + v * b.z + w * c.z) * shear_z;
+    bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+    float t = scaled_t / determinant;
+    TriangleId triangle = TriangleId(trace.current, trace.instance);
+    bool excluded = same_triangle(triangle, trace.from) || same_triangle(triangle, trace.towards);
+    // A zero determinant gives an infinite or undefined t, which fails here.
+    if (inside && determinant != 0.0 && t > 0.0 && t < trace.hit.t && !excluded) {
+        trace.hit = Hit(triangle, t, vec2(v, w) / determinant);
+    }
+}
+
+// Continues at the instance's root with the ray in object space; t keeps its meaning since the direction is not rescaled.
+void enter_instance(inout Trace trace, RenderConstants constants, uint instance) {
+    Affine m = load_world_to_object(constants, instance);
+    set_ray(trace, transform_point(m, trace.world_origin), transform_vector(m, trace.world_direction));
+    if (trace.top != 0u) push_entry(trace, trace.top);
+    trace.top = LEAVE_INSTANCE;
+    trace.instance = instance;
+    trace.current = load_instance_header(constants, instance).x;
+}
+
+void leave_instance(inout Trace trace) {
+    set_ray(trace, trace.world_origin, trace.world_direction);
+    trace.instance = NONE;
+    trace.top = pop_entry(trace);
+}
+
+// Visits one slot.
+void trace_step(inout Trace trace, RenderConstants constants) {
+    uint base = trace.current * SLOT_TEXELS;
+    uvec4 q0 = LOAD4(SLOTS, base);
+    uvec4 q1 = LOAD4(SLOTS, base + 1u);
+    uvec4 q2 = LOAD4(SLOTS, base + 2u);
+    bool leaf = (q2.w & SLOT_LEAF) != 0u;
+    uint next = NONE;
+    uint entry = 0u;
+    if (HAS_INSTANCES && (q2.w & SLOT_INSTANCE) != 0u) {
+        enter_instance(trace, constants, q2.y);
+        return;
+    }
+    if (leaf) {
+        visit_leaf(trace, q0, q1, q2);
+        if (trace.any_hit && trace.hit.triangle.slot != NONE) {
+            trace.current = NONE;
+            return;
+        }
+    } else {
+        visit_inner(trace, q0, q1, q2, next, entry);
+    }
+    if (next == NONE) {
+        if (HAS_INSTANCES && trace.top == LEAVE_INSTANCE) leave_instance(trace);
+        if (trace.top != 0u) {
+            next = (trace.top >> LIST_BITS) << 2u | (trace.top & 3u);
+            uint list = (trace.top & LIST_MASK) >> 2u;
+            trace.top = list == 1u ? pop_entry(trace) : ((trace.top & ~LIST_MASK) | list);
+        }
+    } else if (entry != 0u) {
+        if (trace.top != 0u) push_entry(trace, trace.top);
+        trace.top = entry;
+    }
+    trace.current = next;
+}
+
+// Steps until the next look at which lanes are done; more leave finished lanes idle, fewer test too often.
+const int STEPS_PER_ADVANCE = 6;
+
+void trace_advance(inout Trace trace, RenderConstants constants) {
+    for (int i = 0; i < STEPS_PER_ADVANCE; ++i) {
+        if (trace.current == NONE) break;
+        trace_step(trace, constants);
+    }
+}

@@ -1,0 +1,224 @@
+#version 460
+// The path tracer: a lane renders one atom, that is one pixel and one aligned block of at most 16 sample indices, in
+// order. A lane traces one ray at a time, whatever it is for, in one loop, and takes its next sample as soon as a path
+// ends, so that neighbouring lanes stay busy. A lane that has used up its budget of rays saves its state for the next
+// dispatch: the image does not depend on where it was cut.
+#extension GL_GOOGLE_include_directive : require
+#if TRACE_BACKEND == 1
+#extension GL_EXT_ray_query : require
+#endif
+#if ARRAY_FORM == 2
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#endif
+layout(local_size_x_id = 0, local_size_y = 1, local_size_z = 1) in;
+
+#include "include/layout.glsl"
+#include "include/features.glsl"
+#include "include/rng.glsl"
+#include "include/camera.glsl"
+#include "include/mis.glsl"
+#include "include/surface.glsl"
+
+layout(set = 0, binding = 0, std140) uniform RenderConstantsBlock { RenderConstants constants; };
+layout(set = 0, binding = 1, std430) writeonly buffer ResultBlock { BlockResult results[]; };
+#include "include/lane.glsl"
+layout(set = 0, binding = 2, std430) buffer LaneBlock { LaneState lanes[]; };
+layout(push_constant) uniform SliceBlock { SliceConstants slice; };
+
+// Longest path; reported when it is met. Roulette ends paths long before.
+const uint BOUNCE_CAP = 65535u;
+
+SampleKey sample_key(LaneState lane) { return SampleKey(lane.pixel, lane.sample_index, constants.seed); }
+
+void start_sample(inout LaneState lane) {
+    lane.bounce = 0u;
+    lane.radiance = vec3(0.0);
+    lane.throughput = vec3(1.0);
+    lane.radiance_scale = 1.0;
+    lane.pdf = 0.0;
+    lane.emission_weight = WEIGHT_FULL;
+    vec4 u = to_unit(sample_bits(sample_key(lane), 0u, DIMENSIONS_FILM));
+    CameraRay camera = camera_ray(constants, uvec2(lane.pixel & 0xffffu, lane.pixel >> 16u), u);
+    lane.ray = Ray(camera.origin, camera.direction, INFINITY, false, NO_TRIANGLE, NO_TRIANGLE);
+}
+
+// Adds the light found after `bounce` scattering events, if the integrator counts them.
+void add_radiance(inout LaneState lane, uint bounce, vec3 light) {
+    bool counts = bounce == 0u ? ADDS_EMISSION : (bounce == 1u ? ADDS_DIRECT : ADDS_INDIRECT);
+    if (!counts) return;
+    lane.radiance += light;
+    accumulate(lane, light);
+}
+
+// The share of emission seen along a BSDF sample whose density light sampling matches with `light_pdf`.
+float emission_weight(LaneState lane, float light_pdf) {
+    if (lane.emission_weight == WEIGHT_FULL || light_pdf == 0.0) return 1.0;
+    if (lane.emission_weight == WEIGHT_NONE) return 0.0;
+    return LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE ? mixture_weight(lane.pdf, light_pdf)
+                                                    : mis_weight(lane.pdf, light_pdf);
+}
+
+void add_environment(inout LaneState lane) {
+    vec3 direction = lane.ray.direction;
+    vec3 light = environment_radiance(constants, direction);
+    float pdf = 0.0;
+    if (HAS_LIGHT(LIGHT_ENVIRONMENT) && constants.environment_light != NONE && lane.emission_weight != WEIGHT_FULL)
+        pdf = environment_pdf(constants, direction) * light_pick_probability(constants, constants.environment_light);
+    add_radiance(lane, lane.bounce, lane.throughput * light * emission_weight(lane, pdf));
+}
+
+void add_emission(inout LaneState lane, Surface surface, float distance) {
+    if (max_component(surface.emission) <= 0.0) return;
+    float pdf = 0.0;
+    if (HAS_LIGHT(LIGHT_TRIANGLE) && surface.light != NONE && lane.emission_weight != WEIGHT_FULL)
+        pdf = triangle_light_pdf(constants, surface.light, surface.point, lane.ray.direction, distance);
+    add_radiance(lane, lane.bounce, lane.throughput * surface.emission * emission_weight(lane, pdf));
+}
+
+// Next-event estimation at the surface: leaves a shadow ray and what it adds if nothing is in its way.
+bool sample_direct_light(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle) {
+    if (!scene_has_lights() || !bsdf_has_continuous_lobe(surface.bsdf)) return false;
+    SampleKey key = sample_key(lane);
+    uvec4 bits = sample_bits(key, lane.bounce, DIMENSIONS_LIGHT);
+    uvec4 environment_bits = uvec4(0u);
+    if (HAS_LIGHT(LIGHT_ENVIRONMENT)) environment_bits = sample_bits(key, lane.bounce, DIMENSIONS_ENVIRONMENT);
+    // Every continuous lobe reflects, so the shadow ray leaves on the side of wo.
+    vec3 origin = offset_origin(surface.point, surface.side_normal);
+    LightSample light = sample_light(constants, origin, bits.xyz, environment_bits);
+    vec3 wi = to_local(surface.frame, light.direction);
+    if (max_component(light.radiance) <= 0.0 || wi.y <= 0.0 || dot(light.direction, surface.side_normal) <= 0.0)
+        return false;
+    float weight = 1.0;
+    if (light.pdf > 0.0) {
+        if (LIGHT_SAMPLING == LIGHT_SAMPLING_BSDF) return false;
+        // Mixture: half of the samples leave the light to the BSDF.
+        if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE && bits.w >= 0x80000000u) return false;
+        float bsdf_density = bsdf_pdf(surface.bsdf, wo, wi);
+        if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE) weight = mixture_weight(light.pdf, bsdf_density);
+        if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIS) weight = mis_weight(light.pdf, bsdf_density);
+    }
+    lane.shadow_light = lane.throughput * bsdf_evaluate(surface.bsdf, wo, wi) * (wi.y * weight) * light.radiance;
+    if (max_component(lane.shadow_light) <= 0.0) return false;
+    lane.ray = Ray(origin, light.direction, light.distance, true, triangle, light.triangle);
+    return true;
+}
+
+// How much of the emission that the scattered ray finds is left to it.
+uint scattered_emission_weight(LaneState lane, BsdfSample scattered) {
+    if ((scattered.flags & SCATTERED_DELTA) != 0u || LIGHT_SAMPLING == LIGHT_SAMPLING_BSDF) return WEIGHT_FULL;
+    if (LIGHT_SAMPLING == LIGHT_SAMPLING_NEE) return WEIGHT_NONE;
+    if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE) {
+        uvec4 bits = sample_bits(sample_key(lane), lane.bounce, DIMENSIONS_LIGHT);
+        return bits.w >= 0x80000000u ? WEIGHT_SHARED : WEIGHT_NONE;
+    }
+    return WEIGHT_SHARED;
+}
+
+// Russian roulette: survives with probability min(1, max throughput · η²), which keeps the expectation (Arvo and Kirk
+// 1990). It starts at the third scattering event; late paths always have a chance of 1/20 to end, so that white closed
+// rooms end too.
+bool survives_roulette(inout LaneState lane, float u) {
+    if (lane.bounce < 2u) return true;
+    float survival = min(1.0, max_component(lane.throughput) * lane.radiance_scale);
+    if (lane.bounce >= 64u) survival = min(survival, 0.95);
+    // Written so that a NaN survives and is seen.
+    if (u >= survival) return false;
+    lane.throughput /= survival;
+    return true;
+}
+
+// Draws the next direction and stores its ray; false if the path ends here.
+bool scatter(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle) {
+    vec4 u = to_unit(sample_bits(sample_key(lane), lane.bounce, DIMENSIONS_SCATTER));
+    BsdfSample scattered = bsdf_scatter(surface.bsdf, wo, u.xyz);
+    vec3 direction = to_world(surface.frame, scattered.wi);
+    bool through = (scattered.flags & SCATTERED_THROUGH) != 0u;
+    // Through the shading frame but not through the surface, or the other way round: absorbed.
+    if (through == dot(direction, surface.side_normal) > 0.0) return false;
+    lane.throughput *= scattered.weight;
+    if (through) lane.radiance_scale *= surface.bsdf.eta * surface.bsdf.eta;
+    if (max_component(lane.throughput) == 0.0 || !survives_roulette(lane, u.w)) return false;
+    lane.emission_weight = scattered_emission_weight(lane, scattered);
+    lane.pdf = scattered.pdf;
+    lane.next_origin = offset_origin(surface.point, direction);
+    lane.next_direction = safe_normalize(direction);
+    lane.next_from = triangle;
+    return true;
+}
+
+void finish_sample(inout LaneState lane) {
+    uint bit = 1u << (lane.sample_index % BLOCK_SAMPLES);
+    if (!is_finite(lane.radiance)) lane.non_finite |= bit;
+    lane.luminance_squared += sqr(luminance(lane.radiance));
+    lane.samples += 1u;
+    lane.sample_index += 1u;
+}
+
+// Follows the scattered ray after the shadow ray.
+void follow_scattered(inout LaneState lane) {
+    lane.ray = Ray(lane.next_origin, lane.next_direction, INFINITY, false, lane.next_from, NO_TRIANGLE);
+    lane.bounce += 1u;
+}
+
+// A path's ray has come back: adds what it met and prepares the next ray. False if the path ends.
+bool shade(inout LaneState lane, Hit hit) {
+    if (hit.triangle.slot == NONE) {
+        add_environment(lane);
+        return false;
+    }
+    vec3 view = -lane.ray.direction;
+    Surface surface = surface_at(constants, hit, view);
+    add_emission(lane, surface, hit.t);
+    if (surface.black || lane.bounce >= constants.max_bounces) return false;
+    if (lane.bounce >= BOUNCE_CAP) {
+        lane.capped |= 1u << (lane.sample_index % BLOCK_SAMPLES);
+        return false;
+    }
+    vec3 wo = to_local(surface.frame, view);
+    // The shadow ray replaces lane.ray; its contribution uses the throughput before scattering.
+    bool shadow = sample_direct_light(lane, surface, wo, hit.triangle);
+    bool goes_on = scatter(lane, surface, wo, hit.triangle);
+    lane.path_ends = goes_on ? 0u : 1u;
+    if (shadow) return true;
+    if (goes_on) follow_scattered(lane);
+    return goes_on;
+}
+
+// The lane's ray has been traced. False if the sample is finished.
+bool advance_path(inout LaneState lane, Hit hit) {
+    lane.rays += 1u;
+    if (!lane.ray.any_hit) return shade(lane, hit);
+    if (hit.triangle.slot == NONE) add_radiance(lane, lane.bounce + 1u, lane.shadow_light);
+    if (lane.path_ends != 0u) return false;
+    follow_scattered(lane);
+    return true;
+}
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= slice.lanes) return;
+    LaneState lane;
+    if (slice.resume != 0u) {
+        lane = lanes[index];
+        if (lane.sample_index >= lane.end_sample) return;
+    } else {
+        lane = new_lane(constants, slice, index);
+        if (lane.sample_index < lane.end_sample) start_sample(lane);
+    }
+    uint ray_limit = lane.rays + slice.ray_budget;
+    Trace trace;
+    trace_begin(trace, constants, lane.ray);
+    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
+        trace_advance(trace, constants);
+        if (!trace_done(trace)) continue;
+        if (!advance_path(lane, trace_hit(trace))) {
+            finish_sample(lane);
+            if (lane.sample_index < lane.end_sample) start_sample(lane);
+        }
+        trace_begin(trace, constants, lane.ray);
+    }
+    bool complete = lane.sample_index >= lane.end_sample;
+    results[index] = block_result(lane, complete);
+    lanes[index] = lane;
+}

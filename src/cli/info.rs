@@ -1,0 +1,183 @@
+//! `sunfleck info`: what is in a scene, and what of it is skipped.
+
+use std::collections::BTreeMap;
+
+use clap::Args;
+use serde_json::{Value, json};
+use sunfleck::scene::{Bsdf, Environment, Projection, PunctualKind, Scene, load};
+
+use super::{print_json, print_warnings};
+
+/// Say what is in a scene, what was added to it and what is skipped.
+#[derive(Args, Debug)]
+pub(crate) struct InfoArgs {
+    /// A .gltf, .glb or .obj file, or the name of a built-in scene.
+    scene: String,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Describes the scene.
+pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
+    let mut scene = load::resolve(&args.scene).map_err(sunfleck::Error::from)?;
+    scene.frame_if_no_camera();
+    scene.light_if_dark();
+    print_for_people(&scene);
+    if args.json {
+        print_json(&describe(&scene))?;
+    }
+    Ok(())
+}
+
+/// Counts of a scene. A triangle counts once in its mesh and once for each instance of it.
+struct Counts {
+    primitives: usize,
+    triangles: usize,
+    vertices: usize,
+    instanced_triangles: usize,
+    emissive_triangles: usize,
+    materials_by_bsdf: BTreeMap<&'static str, usize>,
+    image_bytes: usize,
+}
+
+impl Counts {
+    fn of(scene: &Scene) -> Self {
+        let primitives = || scene.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        let placed = || scene.instances.iter().flat_map(|instance| &scene.meshes[instance.mesh].primitives);
+        let mut materials_by_bsdf = BTreeMap::new();
+        for material in &scene.materials {
+            *materials_by_bsdf.entry(bsdf_name(material.bsdf)).or_insert(0) += 1;
+        }
+        Self {
+            primitives: primitives().count(),
+            triangles: primitives().map(|p| p.triangles.len()).sum(),
+            vertices: primitives().map(|p| p.positions.len()).sum(),
+            instanced_triangles: placed().map(|p| p.triangles.len()).sum(),
+            emissive_triangles: placed()
+                .filter(|p| scene.materials.get(p.material).is_some_and(|m| m.is_emissive()))
+                .map(|p| p.triangles.len())
+                .sum(),
+            materials_by_bsdf,
+            image_bytes: scene.images.iter().map(image_bytes).sum(),
+        }
+    }
+}
+
+fn bsdf_name(bsdf: Bsdf) -> &'static str {
+    match bsdf {
+        Bsdf::Lambertian => "lambertian",
+        Bsdf::Mirror => "mirror",
+        Bsdf::Refract => "refract",
+        Bsdf::Glass => "glass",
+        Bsdf::MetallicRoughness => "metallic-roughness",
+        Bsdf::Unlit => "unlit",
+    }
+}
+
+fn image_bytes(image: &sunfleck::scene::Image) -> usize {
+    match &image.texels {
+        sunfleck::scene::Texels::Rgba8(texels) => size_of_val(texels.as_slice()),
+        sunfleck::scene::Texels::Rgba16(texels) => size_of_val(texels.as_slice()),
+    }
+}
+
+fn describe(scene: &Scene) -> Value {
+    let counts = Counts::of(scene);
+    let cameras: Vec<_> = scene.cameras.iter().enumerate().map(|(i, c)| camera(i, c)).collect();
+    let lights: Vec<_> = scene.lights.iter().map(|l| json!({"name": l.name, "kind": light_kind(l.kind)})).collect();
+    let images: Vec<_> = scene
+        .images
+        .iter()
+        .map(|i| json!({"name": i.name, "width": i.width, "height": i.height, "bytes": image_bytes(i)}))
+        .collect();
+    json!({
+        "scene": scene.name,
+        "meshes": scene.meshes.len(),
+        "primitives": counts.primitives,
+        "triangles": counts.triangles,
+        "vertices": counts.vertices,
+        "instances": scene.instances.len(),
+        "instanced_triangles": counts.instanced_triangles,
+        "emissive_triangles": counts.emissive_triangles,
+        "materials": scene.materials.len(),
+        "materials_by_bsdf": counts.materials_by_bsdf,
+        "textures": scene.textures.len(),
+        "images": images,
+        "image_bytes": counts.image_bytes,
+        "lights": lights,
+        "environment": environment(&scene.environment),
+        "cameras": cameras,
+        "notes": scene.notes,
+        "warnings": scene.warnings,
+    })
+}
+
+fn camera(index: usize, camera: &sunfleck::scene::Camera) -> Value {
+    let projection = match camera.projection {
+        Projection::Perspective { yfov_radians } => {
+            json!({"kind": "perspective", "yfov_degrees": yfov_radians.to_degrees()})
+        }
+        Projection::Orthographic { ymag } => json!({"kind": "orthographic", "ymag": ymag}),
+    };
+    let position = camera.camera_to_world.translation.to_array();
+    json!({"index": index, "name": camera.name, "projection": projection, "position": position})
+}
+
+fn light_kind(kind: PunctualKind) -> &'static str {
+    match kind {
+        PunctualKind::Point => "point",
+        PunctualKind::Spot { .. } => "spot",
+        PunctualKind::Directional => "directional",
+    }
+}
+
+fn environment(environment: &Environment) -> Value {
+    match environment {
+        Environment::None => json!({"kind": "none"}),
+        Environment::Constant(radiance) => json!({"kind": "constant", "radiance": radiance}),
+        Environment::Image { name, width, height, strength, rotation_radians, .. } => json!({
+            "kind": "image",
+            "name": name,
+            "width": width,
+            "height": height,
+            "strength": strength,
+            "rotation_degrees": rotation_radians.to_degrees(),
+        }),
+    }
+}
+
+fn print_for_people(scene: &Scene) {
+    let counts = Counts::of(scene);
+    let by_bsdf: Vec<_> = counts.materials_by_bsdf.iter().map(|(name, count)| format!("{count} {name}")).collect();
+    eprintln!("{}", scene.name);
+    eprintln!(
+        "  meshes       {} of {} primitives, {} triangles, {} vertices",
+        scene.meshes.len(),
+        counts.primitives,
+        counts.triangles,
+        counts.vertices
+    );
+    eprintln!("  instances    {}, {} triangles", scene.instances.len(), counts.instanced_triangles);
+    eprintln!("  materials    {} ({})", scene.materials.len(), by_bsdf.join(", "));
+    let megabytes = counts.image_bytes as f64 / 1e6;
+    eprintln!("  textures     {} of {} images, {megabytes:.1} MB decoded", scene.textures.len(), scene.images.len());
+    let count = |wanted: &str| scene.lights.iter().filter(|l| light_kind(l.kind) == wanted).count();
+    let [point, spot, directional] = ["point", "spot", "directional"].map(count);
+    let emissive = counts.emissive_triangles;
+    eprintln!("  lights       {emissive} emissive triangles, {point} point, {spot} spot, {directional} directional");
+    match &scene.environment {
+        Environment::None => eprintln!("  environment  none"),
+        Environment::Constant([r, g, b]) => eprintln!("  environment  constant radiance {r} {g} {b}"),
+        Environment::Image { name, width, height, .. } => eprintln!("  environment  {name}, {width}x{height}"),
+    }
+    for (index, camera) in scene.cameras.iter().enumerate() {
+        let kind = match camera.projection {
+            Projection::Perspective { yfov_radians } => format!("perspective, {:.4}° high", yfov_radians.to_degrees()),
+            Projection::Orthographic { ymag } => format!("orthographic, {} m high", 2.0 * ymag),
+        };
+        eprintln!("  camera {index}     '{}': {kind}", camera.name);
+    }
+    scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    print_warnings(&scene.warnings);
+}

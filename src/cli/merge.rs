@@ -1,0 +1,54 @@
+//! `sunfleck merge`: sample ranges to one image.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use sunfleck::film::exr::read_exr;
+use sunfleck::film::merge::merge;
+use sunfleck::film::output::{ImageFormat, check_writable};
+use sunfleck::film::png::{tone_map_srgb8, write_png};
+use sunfleck::film::tonemap::ToneMap;
+use sunfleck::{Error, Result};
+
+use super::print_warnings;
+
+const EXAMPLES: &str = "\
+Example:
+  sunfleck render scene.gltf --samples 0..64 -o a.exr
+  sunfleck render scene.gltf --samples 64..128 -o b.exr
+  sunfleck merge a.exr b.exr -o image.exr              equals --spp 128 in one run, to 1 ulp";
+
+/// Merge images of disjoint samples to the image of all of them, weighted by their sample counts.
+///
+/// Merge all parts in one command: merging merged images rounds once more.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct MergeArgs {
+    /// Images that `sunfleck render` wrote, of the same view.
+    #[arg(required = true, value_name = "PART.exr")]
+    parts: Vec<PathBuf>,
+    /// The image to write: .exr, or .png (clipped at radiance 1).
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Merges the parts.
+pub(crate) fn run(args: &MergeArgs) -> anyhow::Result<()> {
+    let format = ImageFormat::of(&args.output)?;
+    check_writable(&args.output)?;
+    let parts = args.parts.iter().map(|path| Ok((path.clone(), read_exr(path)?))).collect::<Result<Vec<_>>>()?;
+    let merged = merge(parts)?;
+    print_warnings(&merged.warnings);
+    let image = merged.image;
+    match format {
+        ImageFormat::Exr => image.write(&args.output)?,
+        ImageFormat::Png => {
+            let radiance = image.rgb().ok_or_else(|| Error::input(&args.output, "the merged image has no colours"))?;
+            let (pixels, _) = tone_map_srgb8(&radiance, 0.0, ToneMap::default());
+            write_png(&args.output, image.width, image.height, &pixels)?;
+        }
+    }
+    let spp = image.metadata.samples_per_pixel.unwrap_or_default();
+    eprintln!("merged {} images to {}: {spp} samples per pixel", args.parts.len(), args.output.display());
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! The command line: one file a subcommand. Everything for people goes to standard error; standard output is for
+//! `--json` alone.
+
+mod bench;
+mod compare;
+mod devices;
+mod info;
+mod interrupt;
+mod merge;
+mod not_built;
+mod parse;
+mod progress;
+mod render;
+mod render_args;
+mod render_report;
+mod watch;
+
+use std::io::{self, Write};
+
+use anyhow::Context;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+/// Exit codes, for `--help`; [`sunfleck::Error::exit_code`] decides them.
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  2    usage: an unknown name, an impossible value, something that is not built yet
+  3    the scene or another input is bad, or an output cannot be written
+  4    no usable device, or the device lacks what was demanded
+  5    the device was lost or is out of memory
+  6    the result is not trustworthy (--strict)
+  130  interrupted, after the partial image was written";
+
+/// Sunfleck: a headless, physically based path tracer on Vulkan, with and without ray-tracing hardware.
+#[derive(Debug, Parser)]
+#[command(name = "sunfleck", version, about, after_help = EXIT_CODES, max_term_width = 100)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(Box<render_args::RenderArgs>),
+    Devices(devices::DevicesArgs),
+    Info(info::InfoArgs),
+    Compare(compare::CompareArgs),
+    Merge(merge::MergeArgs),
+    Bench(bench::BenchArgs),
+    Watch(watch::WatchArgs),
+}
+
+/// Parses the process's arguments; a usage error or `--help` ends the process.
+pub(crate) fn parse() -> Cli {
+    let matches = not_built::mark_in_help(Cli::command()).get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
+/// Does what the command line asks for.
+pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
+    init_tracing();
+    not_built::refuse(&cli.command)?;
+    match cli.command {
+        Command::Render(args) => render::run(args.resolve()?),
+        Command::Devices(args) => devices::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Bench(_) | Command::Watch(_) => unreachable!("refused as not built"),
+    }
+}
+
+/// The exit code of an error: what the library says where it is one of its own, else 1 (a bug or a broken pipe).
+pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {
+    error.chain().find_map(|e| e.downcast_ref::<sunfleck::Error>()).map_or(1, sunfleck::Error::exit_code)
+}
+
+/// Warnings and diagnostics go to standard error; `RUST_LOG=sunfleck=debug` shows more.
+fn init_tracing() {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr).without_time().init();
+}
+
+/// Prints one JSON object on standard output.
+fn print_json(value: &serde_json::Value) -> anyhow::Result<()> {
+    let mut stdout = io::stdout().lock();
+    match writeln!(stdout, "{value:#}").and_then(|()| stdout.flush()) {
+        // A reader that has seen enough (`| head`) is no error.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.context("cannot write to standard output"),
+    }
+}
+
+/// Prints warnings for people, one line each.
+fn print_warnings<'a>(warnings: impl IntoIterator<Item = &'a String>) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}

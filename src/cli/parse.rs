@@ -1,0 +1,82 @@
+//! Parsers of option values.
+
+use std::ops::Range;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+/// Film sums are 40 bytes a pixel on the host; 2²⁸ pixels are 10 GiB of them.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// A parser for an enum with names: help and errors list them.
+pub(crate) fn named<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err = String> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
+}
+
+/// `1280x720`.
+pub(crate) fn resolution(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let (width, height): (u32, u32) = sides.ok_or("expected WIDTHxHEIGHT in pixels, as in 1280x720")?;
+    if width == 0 || height == 0 {
+        return Err("an image has at least 1x1 pixels".to_owned());
+    }
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(format!("more than {MAX_PIXELS} pixels (2^28); render it in parts"));
+    }
+    Ok((width, height))
+}
+
+/// `30s`, `2m`, `500ms`, `1.5h`; a bare number is seconds.
+pub(crate) fn duration(text: &str) -> Result<Duration, String> {
+    let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let factor = match unit {
+        "ms" => 1e-3,
+        "s" | "" => 1.0,
+        "m" | "min" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(format!("unknown unit '{unit}'; use ms, s, m or h, as in 30s")),
+    };
+    let seconds = number.trim().parse::<f64>().map_err(|_| "expected a time such as 500ms, 30s, 2m or 1h")? * factor;
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(duration) if !duration.is_zero() => Ok(duration),
+        _ => Err("expected a time above 0".to_owned()),
+    }
+}
+
+/// `A..B`, the sample indices from A up to but without B.
+pub(crate) fn sample_range(text: &str) -> Result<Range<u32>, String> {
+    let ends = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let (start, end): (u32, u32) = ends.ok_or("expected A..B, the sample indices from A up to but without B")?;
+    if start >= end { Err("the range is empty: expected A..B with A below B".to_owned()) } else { Ok(start..end) }
+}
+
+/// A finite number.
+pub(crate) fn finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "expected a finite number".to_owned())
+}
+
+/// A finite number that is not negative and fits an f32.
+pub(crate) fn not_negative(text: &str) -> Result<f32, String> {
+    let number = finite(text)? as f32;
+    if number >= 0.0 && number.is_finite() {
+        Ok(number)
+    } else {
+        Err("expected a number that is not negative".to_owned())
+    }
+}
+
+/// A finite number above 0.
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|&x| x > 0.0).ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+/// Exposure steps; ±60 is beyond every radiance that occurs and still multiplies without overflow of an f32's factor.
+pub(crate) fn exposure_ev(text: &str) -> Result<f32, String> {
+    let ev = finite(text)?;
+    if ev.abs() <= 60.0 { Ok(ev as f32) } else { Err("expected exposure steps between -60 and 60".to_owned()) }
+}

@@ -1,0 +1,225 @@
+//! `sunfleck render`: from a job to images and a report.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Context;
+use sunfleck::Error;
+use sunfleck::film::Film;
+use sunfleck::film::exr::ExrImage;
+use sunfleck::film::metadata::{Metadata, REC709_CHROMATICITIES, software};
+use sunfleck::film::output::ImageFormat;
+use sunfleck::film::png::{tone_map_srgb8, write_png};
+use sunfleck::render::{RenderResult, Settings, StopReason};
+use sunfleck::scene::{Environment, Scene, load};
+
+use super::progress::Progress;
+use super::render_args::{EnvironmentArgs, RenderJob};
+use super::render_report::{print_summary, report};
+use super::{interrupt, print_json, print_warnings};
+
+/// Renders the job and writes its images.
+pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
+    let loading = Instant::now();
+    let scene = load_scene(&job)?;
+    let load_seconds = loading.elapsed().as_secs_f64();
+    interrupt::install();
+    let mut progress = Progress::new(job.quiet);
+    let result = sunfleck::render::render(&scene, &job.settings, &mut |update| {
+        progress.show(update);
+        if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    progress.finish();
+    let mut result = result?;
+    result.seconds.load = load_seconds;
+    finish(&job, &scene, result)
+}
+
+/// Writes and reports a result, and judges it.
+fn finish(job: &RenderJob, scene: &Scene, mut result: RenderResult) -> anyhow::Result<()> {
+    let writing = Instant::now();
+    write_outputs(job, scene, &result)?;
+    result.seconds.write = writing.elapsed().as_secs_f64();
+    print_warnings(&result.warnings);
+    if !job.quiet {
+        print_summary(job, &result);
+    }
+    if job.json {
+        print_json(&report(job, scene, &result))?;
+    }
+    verdict(&job.settings, &result)
+}
+
+/// The scene with the environment that the flags ask for, with a camera and with light.
+fn load_scene(job: &RenderJob) -> anyhow::Result<Scene> {
+    let mut scene = load::resolve(&job.scene).map_err(Error::from)?;
+    change_environment(&mut scene, &job.environment)?;
+    scene.frame_if_no_camera();
+    print_warnings(&scene.warnings);
+    if !job.quiet {
+        scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    }
+    Ok(scene)
+}
+
+fn change_environment(scene: &mut Scene, change: &EnvironmentArgs) -> anyhow::Result<()> {
+    if let Some(file) = &change.file {
+        scene.environment = load::load_environment(file, change.strength, change.rotation_degrees)
+            .map_err(Error::from)
+            .context("--env")?;
+        scene.light_if_dark();
+        return Ok(());
+    }
+    // Before the strength is applied, so that it acts on the added environment too.
+    scene.light_if_dark();
+    match &mut scene.environment {
+        Environment::None => {}
+        Environment::Constant(radiance) => *radiance = radiance.map(|c| c * change.strength),
+        Environment::Image { strength, rotation_radians, .. } => {
+            *strength *= change.strength;
+            *rotation_radians += change.rotation_degrees.to_radians();
+        }
+    }
+    Ok(())
+}
+
+/// Writes every image. If one fails the others are still written, since the samples took their time.
+fn write_outputs(job: &RenderJob, scene: &Scene, result: &RenderResult) -> sunfleck::Result<()> {
+    let mut outcome = Ok(());
+    for (path, format) in &job.outputs {
+        let written = match format {
+            ImageFormat::Exr => ExrImage::from_film(&result.film, metadata(job, scene, result)).write(path),
+            ImageFormat::Png => write_tone_mapped(path, job, &result.film),
+        };
+        outcome = outcome.and(written);
+    }
+    outcome
+}
+
+fn write_tone_mapped(path: &Path, job: &RenderJob, film: &Film) -> sunfleck::Result<()> {
+    let (pixels, non_finite) = tone_map_srgb8(&film.radiance(), job.exposure_ev, job.tone_map);
+    if non_finite > 0 {
+        eprintln!("warning: {}: {non_finite} pixels are NaN or infinite; they are magenta", path.display());
+    }
+    write_png(path, film.width(), film.height(), &pixels)
+}
+
+fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {
+    Metadata {
+        seed: Some(job.settings.seed),
+        sample_ranges: vec![job.settings.samples_in(&result.film)],
+        render_time_seconds: Some(result.seconds.render as f32),
+        world_to_camera: Some(result.world_to_camera),
+        world_to_ndc: Some(result.world_to_ndc),
+        chromaticities: Some(REC709_CHROMATICITIES),
+        software: Some(software()),
+        kernel_key: Some(result.kernel_key.clone()),
+        scene: Some(scene.name.clone()),
+        integrator: Some(job.settings.integrator.to_string()),
+        device: Some(format!("{}, {}", result.device, result.driver)),
+        ..Metadata::default()
+    }
+}
+
+/// Whether a run whose images are written was a success.
+fn verdict(settings: &Settings, result: &RenderResult) -> anyhow::Result<()> {
+    if result.stopped_by == StopReason::Interrupted {
+        return Err(Error::Interrupted.into());
+    }
+    if settings.strict && result.non_finite_samples > 0 {
+        let count = result.non_finite_samples;
+        return Err(Error::Untrustworthy(format!("--strict: {count} samples were NaN or infinite")).into());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sunfleck::film::exr::read_exr;
+    use sunfleck::film::tonemap::ToneMap;
+    use sunfleck::render::{NonFiniteSample, Seconds};
+
+    fn job(folder: &Path) -> RenderJob {
+        RenderJob {
+            scene: "cornell".to_owned(),
+            outputs: vec![(folder.join("a.exr"), ImageFormat::Exr), (folder.join("a.png"), ImageFormat::Png)],
+            settings: Settings { width: 2, height: 1, seed: 3, ..Settings::default() },
+            environment: EnvironmentArgs { file: None, strength: 1.0, rotation_degrees: 0.0 },
+            exposure_ev: 0.0,
+            tone_map: ToneMap::default(),
+            json: false,
+            quiet: true,
+        }
+    }
+
+    fn result() -> RenderResult {
+        let mut film = Film::new(2, 1);
+        film.add_block(0, [4.0; 3], 5.0, 4);
+        film.add_block(1, [2.0; 3], 1.5, 4);
+        RenderResult {
+            film,
+            stopped_by: StopReason::Samples,
+            device: "a device".to_owned(),
+            driver: "its driver".to_owned(),
+            trace: "bvh".to_owned(),
+            kernel_key: "key".to_owned(),
+            features: vec!["mis".to_owned()],
+            rays: 100,
+            paths: 8,
+            seconds: Seconds { render: 2.0, ..Seconds::default() },
+            gpu_bytes: 1000,
+            non_finite_samples: 0,
+            first_non_finite: Vec::new(),
+            world_to_camera: [1.0; 16],
+            world_to_ndc: [2.0; 16],
+            warnings: Vec::new(),
+        }
+    }
+
+    fn exit_code(error: &anyhow::Error) -> u8 {
+        super::super::exit_code(error)
+    }
+
+    #[test]
+    fn a_result_becomes_images_with_attributes() {
+        let folder = tempfile::tempdir().unwrap();
+        finish(&job(folder.path()), &Scene::default(), result()).unwrap();
+        let image = read_exr(&folder.path().join("a.exr")).unwrap();
+        assert_eq!(image.rgb().unwrap(), vec![[1.0; 3], [0.5; 3]]);
+        assert_eq!(sunfleck::film::metadata::format_ranges(&image.metadata.sample_ranges), "0..4");
+        assert_eq!((image.metadata.seed, image.metadata.samples_per_pixel), (Some(3), Some(4.0)));
+        assert_eq!(image.metadata.device.as_deref(), Some("a device, its driver"));
+        assert!(folder.path().join("a.png").exists());
+    }
+
+    #[test]
+    fn the_report_has_what_the_contract_names() {
+        let report = report(&job(Path::new("")), &Scene::default(), &result());
+        let names = "device driver trace width height spp rays seconds rays_per_second paths_per_second estimated_error \
+            non_finite_samples features gpu_bytes outputs";
+        for name in names.split_whitespace() {
+            assert!(report.get(name).is_some_and(|value| !value.is_null()), "{name}: {report}");
+        }
+        for part in ["load", "prepare", "compile", "upload", "render", "write"] {
+            assert!(report["seconds"][part].is_f64(), "{part}");
+        }
+        assert_eq!((&report["rays_per_second"], &report["spp"]), (&50.0.into(), &4.0.into()));
+    }
+
+    #[test]
+    fn the_images_are_written_before_a_run_is_judged() {
+        let folder = tempfile::tempdir().unwrap();
+        let bad = NonFiniteSample { x: 1, y: 0, sample: 2 };
+        let suspect = RenderResult { non_finite_samples: 1, first_non_finite: vec![bad], ..result() };
+        let mut job = job(folder.path());
+        finish(&job, &Scene::default(), suspect.clone()).unwrap();
+        job.settings.strict = true;
+        assert_eq!(exit_code(&finish(&job, &Scene::default(), suspect).unwrap_err()), 6);
+        let interrupted = RenderResult { stopped_by: StopReason::Interrupted, ..result() };
+        std::fs::remove_file(&job.outputs[0].0).unwrap();
+        assert_eq!(exit_code(&finish(&job, &Scene::default(), interrupted).unwrap_err()), 130);
+        assert!(job.outputs[0].0.exists());
+    }
+}

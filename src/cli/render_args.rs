@@ -1,0 +1,247 @@
+//! `sunfleck render`: its flags, and the job that they describe once the errors that need no scene are out of the way.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use sunfleck::film::output::{ImageFormat, check_writable};
+use sunfleck::film::tonemap::ToneMap;
+use sunfleck::render::{
+    DeviceChoice, EnvSampling, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings, TraceChoice,
+};
+use sunfleck::{Error, Result};
+
+use super::parse;
+
+const EXAMPLES: &str = "\
+Examples:
+  sunfleck render                                   the Cornell box, to cornell.exr and cornell.png
+  sunfleck render scene.gltf -o a.exr -o a.png --spp 512
+  sunfleck render scene.glb --time 30s --resolution 1920x1080 --json
+  sunfleck render scene.obj --env sky.hdr --env-rotation 90 --exposure -1
+  sunfleck render scene.gltf --samples 0..64 -o part0.exr     one part of a farm's work
+  sunfleck render --device 1 --trace bvh --seed 7";
+
+/// Render a scene to EXR and PNG images.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct RenderArgs {
+    /// A .gltf, .glb or .obj file, or the name of a built-in scene.
+    #[arg(default_value = "cornell")]
+    scene: String,
+    /// Output image: .exr is linear 32-bit float radiance, .png tone-mapped sRGB. May be given several times
+    /// [default: SCENE.exr and SCENE.png in the current folder].
+    #[arg(short, long = "output", value_name = "FILE")]
+    outputs: Vec<PathBuf>,
+
+    /// Width and height of the image in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse::resolution, help_heading = "Image")]
+    resolution: (u32, u32),
+    /// Camera of the scene, by name or index [default: the first].
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "Image")]
+    camera: Option<String>,
+    /// Exposure of .png outputs in steps: +1 doubles the brightness.
+    #[arg(long, value_name = "EV", default_value = "0", allow_hyphen_values = true, value_parser = parse::exposure_ev, help_heading = "Image")]
+    exposure: f32,
+    /// Tone curve of .png outputs: clip (min(L, 1)), exponential (1 - exp(-L)), reinhard (L / (1 + L)), aces.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = tone_map_parser(), hide_possible_values = true, help_heading = "Image")]
+    tonemap: ToneMap,
+    /// Pixel filter.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<PixelFilter>(PixelFilter::NAMES), help_heading = "Image")]
+    pub(super) filter: PixelFilter,
+    /// More layers in .exr outputs, such as albedo,normal,depth.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "Image")]
+    pub(super) aov: Vec<String>,
+    /// Denoise the image.
+    #[arg(long, help_heading = "Image")]
+    pub(super) denoise: bool,
+
+    /// Samples per pixel [default: 128, or without limit if --time is given].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "samples", help_heading = "How long")]
+    spp: Option<u32>,
+    /// Stop rendering after this time, as in 500ms, 30s, 2m, 1h.
+    #[arg(long, value_name = "TIME", value_parser = parse::duration, help_heading = "How long")]
+    time: Option<Duration>,
+    /// Stop at this relative error.
+    #[arg(long, value_name = "ERROR", value_parser = parse::positive, help_heading = "How long")]
+    pub(super) target_error: Option<f64>,
+    /// Render the sample indices from A up to but without B only; `sunfleck merge` joins such parts to one run.
+    #[arg(long, value_name = "A..B", value_parser = parse::sample_range, help_heading = "How long")]
+    samples: Option<Range<u32>>,
+    /// Say what the render would take, and do not render.
+    #[arg(long, help_heading = "How long")]
+    pub(super) estimate: bool,
+    /// Save the state of the run to this file now and then.
+    #[arg(long, value_name = "FILE", help_heading = "How long")]
+    pub(super) checkpoint: Option<PathBuf>,
+    /// Go on from the checkpoint.
+    #[arg(long, help_heading = "How long")]
+    pub(super) resume: bool,
+
+    /// Seed of the sampler: another seed, independent noise.
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Light transport")]
+    seed: u32,
+    /// Scattering events a path may have: 0 shows emitters alone, 1 adds direct light [default: unlimited].
+    #[arg(long, value_name = "N", help_heading = "Light transport")]
+    max_bounces: Option<u32>,
+    /// Which part of the light to add up; emission + direct + indirect = path.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<Integrator>(Integrator::NAMES), help_heading = "Light transport")]
+    integrator: Integrator,
+    /// Where the random numbers come from.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<SamplerKind>(SamplerKind::NAMES), help_heading = "Light transport")]
+    pub(super) sampler: SamplerKind,
+    /// How light is looked for: mis takes two samples, mixture one of the averaged pdf, nee and bsdf one strategy.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<LightSampling>(LightSampling::NAMES), help_heading = "Light transport")]
+    light_sampling: LightSampling,
+    /// How --light-sampling mis weighs its samples.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<MisHeuristic>(MisHeuristic::NAMES), help_heading = "Light transport")]
+    mis: MisHeuristic,
+
+    /// Image of the environment (.hdr or .exr, latitude/longitude), in place of the scene's.
+    #[arg(long, value_name = "FILE", help_heading = "Environment")]
+    env: Option<PathBuf>,
+    /// Factor on the environment's radiance.
+    #[arg(long, value_name = "X", default_value = "1", value_parser = parse::not_negative, help_heading = "Environment")]
+    env_strength: f32,
+    /// Rotation of the environment about +Y in degrees, counter-clockwise seen from above.
+    #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true, value_parser = parse::finite, help_heading = "Environment")]
+    env_rotation: f64,
+    /// How directions to the environment are chosen.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<EnvSampling>(EnvSampling::NAMES), help_heading = "Environment")]
+    env_sampling: EnvSampling,
+
+    /// Device to render on: a number or a part of a name (see `sunfleck devices`), all, or auto.
+    #[arg(long, value_name = "NAME|INDEX|all|auto", default_value_t, help_heading = "Device")]
+    pub(super) device: DeviceChoice,
+    /// How rays are traced: by hardware ray queries, by the shader's own BVH, or whichever the device has.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<TraceChoice>(TraceChoice::NAMES), help_heading = "Device")]
+    trace: TraceChoice,
+    /// Folder of shader sources to use in place of the built-in ones.
+    #[arg(long, value_name = "DIR", help_heading = "Device")]
+    shaders: Option<PathBuf>,
+
+    /// Print one JSON object about the run on standard output.
+    #[arg(long, help_heading = "Reports")]
+    json: bool,
+    /// No progress and no summary; errors and warnings remain.
+    #[arg(long, short, help_heading = "Reports")]
+    quiet: bool,
+    /// Exit with 6 if a result is not trustworthy, such as after a NaN sample.
+    #[arg(long, help_heading = "Reports")]
+    strict: bool,
+}
+
+fn tone_map_parser() -> impl clap::builder::TypedValueParser<Value = ToneMap> {
+    const NAMES: [&str; ToneMap::NAMES.len()] = {
+        let mut names = [""; ToneMap::NAMES.len()];
+        let mut i = 0;
+        while i < names.len() {
+            names[i] = ToneMap::NAMES[i].0;
+            i += 1;
+        }
+        names
+    };
+    parse::named(&NAMES)
+}
+
+/// A render with everything about it that is not the scene's.
+#[derive(Clone, Debug)]
+pub(crate) struct RenderJob {
+    /// A file or the name of a built-in scene.
+    pub(crate) scene: String,
+    /// Images to write, each with a known format and checked to be writable.
+    pub(crate) outputs: Vec<(PathBuf, ImageFormat)>,
+    /// What the library needs to know.
+    pub(crate) settings: Settings,
+    /// Changes to the scene's environment.
+    pub(crate) environment: EnvironmentArgs,
+    /// Exposure steps of PNG outputs.
+    pub(crate) exposure_ev: f32,
+    /// Tone curve of PNG outputs.
+    pub(crate) tone_map: ToneMap,
+    /// Print a JSON object on standard output.
+    pub(crate) json: bool,
+    /// Say nothing but warnings.
+    pub(crate) quiet: bool,
+}
+
+/// What the `--env` flags say.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct EnvironmentArgs {
+    /// Image in place of the scene's environment.
+    pub(crate) file: Option<PathBuf>,
+    /// Factor on the radiance of whichever environment there is.
+    pub(crate) strength: f32,
+    /// Rotation about +Y in degrees, added to the environment's own.
+    pub(crate) rotation_degrees: f64,
+}
+
+impl RenderArgs {
+    /// The job, after every check that needs neither the scene nor a device.
+    pub(crate) fn resolve(self) -> Result<RenderJob> {
+        let outputs = self.checked_outputs()?;
+        if let Some(folder) = self.shaders.as_deref().filter(|folder| !folder.is_dir()) {
+            return Err(Error::Usage(format!("--shaders: '{}' is not a folder", folder.display())));
+        }
+        let (width, height) = self.resolution;
+        let without_limit = if self.time.is_some() { u32::MAX } else { Settings::default().spp };
+        let settings = Settings {
+            width,
+            height,
+            spp: self.spp.unwrap_or(without_limit),
+            time: self.time,
+            sample_range: self.samples,
+            seed: self.seed,
+            max_bounces: self.max_bounces,
+            integrator: self.integrator,
+            sampler: self.sampler,
+            light_sampling: self.light_sampling,
+            mis_heuristic: self.mis,
+            env_sampling: self.env_sampling,
+            filter: self.filter,
+            trace: self.trace,
+            device: self.device,
+            shaders_dir: self.shaders,
+            camera: self.camera,
+            strict: self.strict,
+        };
+        Ok(RenderJob {
+            scene: self.scene,
+            outputs,
+            settings,
+            environment: EnvironmentArgs {
+                file: self.env,
+                strength: self.env_strength,
+                rotation_degrees: self.env_rotation,
+            },
+            exposure_ev: self.exposure,
+            tone_map: self.tonemap,
+            json: self.json,
+            quiet: self.quiet,
+        })
+    }
+
+    /// The outputs with their formats: usage errors first, then what the file system says.
+    fn checked_outputs(&self) -> Result<Vec<(PathBuf, ImageFormat)>> {
+        let named = if self.outputs.is_empty() { default_outputs(&self.scene) } else { self.outputs.clone() };
+        let mut outputs: Vec<(PathBuf, ImageFormat)> = Vec::new();
+        for path in named {
+            let format = ImageFormat::of(&path)?;
+            if outputs.iter().any(|(other, _)| *other == path) {
+                return Err(Error::Usage(format!("output '{}' is given twice", path.display())));
+            }
+            outputs.push((path, format));
+        }
+        for (path, _) in &outputs {
+            check_writable(path)?;
+        }
+        Ok(outputs)
+    }
+}
+
+/// `SCENE.exr` and `SCENE.png` in the current folder.
+fn default_outputs(scene: &str) -> Vec<PathBuf> {
+    let name = Path::new(scene).file_stem().map_or("image".into(), |stem| stem.to_string_lossy());
+    ["exr", "png"].map(|extension| PathBuf::from(format!("{name}.{extension}"))).to_vec()
+}

@@ -1,0 +1,80 @@
+//! What `sunfleck render` says when it is done: a summary for people, an object for programs.
+
+use serde_json::{Value, json};
+use sunfleck::render::{RenderResult, StopReason};
+use sunfleck::scene::Scene;
+
+use super::progress::{time, with_prefix};
+use super::render_args::RenderJob;
+
+/// The object of `--json`. Rates are per second of the render part alone.
+pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Value {
+    let rate = |count: u64| count as f64 / result.seconds.render.max(1e-9);
+    let warnings = [scene.warnings.as_slice(), result.warnings.as_slice()].concat();
+    let samples = job.settings.samples_in(&result.film);
+    let outputs: Vec<_> = job.outputs.iter().map(|(path, _)| path.display().to_string()).collect();
+    json!({
+        "scene": job.scene,
+        "device": result.device,
+        "driver": result.driver,
+        "trace": result.trace,
+        "kernel_key": result.kernel_key,
+        "features": result.features,
+        "width": result.film.width(),
+        "height": result.film.height(),
+        "spp": result.film.mean_samples_per_pixel(),
+        "samples": [samples.start, samples.end],
+        "seed": job.settings.seed,
+        "integrator": job.settings.integrator.name(),
+        "sampler": job.settings.sampler.name(),
+        "light_sampling": job.settings.light_sampling.name(),
+        "max_bounces": job.settings.max_bounces,
+        "stopped_by": result.stopped_by.to_string(),
+        "rays": result.rays,
+        "paths": result.paths,
+        "seconds": result.seconds,
+        "rays_per_second": rate(result.rays),
+        "paths_per_second": rate(result.paths),
+        "estimated_error": result.film.estimated_error(),
+        "non_finite_samples": result.non_finite_samples,
+        "first_non_finite": result.first_non_finite,
+        "gpu_bytes": result.gpu_bytes,
+        "notes": scene.notes,
+        "warnings": warnings,
+        "outputs": outputs,
+    })
+}
+
+/// What the run did, in a few lines on standard error.
+pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
+    let film = &result.film;
+    let why = match result.stopped_by {
+        StopReason::Samples => "all samples are done",
+        StopReason::Time => "the time was up",
+        StopReason::TargetError => "the error was reached",
+        StopReason::Interrupted => "interrupted",
+    };
+    eprintln!(
+        "rendered {}x{} at {:.6} samples per pixel in {} ({why})",
+        film.width(),
+        film.height(),
+        film.mean_samples_per_pixel(),
+        time(result.seconds.render)
+    );
+    eprintln!("  on {} ({}), trace {}", result.device, result.driver, result.trace);
+    let seconds = result.seconds.render.max(1e-9);
+    let rate = |count: u64| with_prefix(count as f64 / seconds);
+    eprintln!("  {}paths/s, {}rays/s", rate(result.paths), rate(result.rays));
+    if let Some(error) = film.estimated_error() {
+        eprintln!("  estimated relative error {:.3} %", 100.0 * error);
+    }
+    if result.non_finite_samples > 0 {
+        eprintln!("warning: {} samples were NaN or infinite; each is a bug:", result.non_finite_samples);
+        for s in &result.first_non_finite {
+            eprintln!("  pixel ({}, {}), sample {}", s.x, s.y, s.sample);
+        }
+    }
+    for (path, _) in &job.outputs {
+        eprintln!("  {}", path.display());
+    }
+}

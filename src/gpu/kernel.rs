@@ -1,0 +1,269 @@
+//! Compute kernels: a pipeline with its bindings, and sets of resources for them.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::{AccelerationStructures, Buffer, Gpu, GpuError, GpuResult};
+
+/// How the shader traces rays (macro TRACE_BACKEND).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum TraceBackend {
+    /// Our own BVH.
+    Bvh = 0,
+    /// Hardware ray queries.
+    RayQuery = 1,
+}
+
+impl std::fmt::Display for TraceBackend {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Bvh => "bvh",
+            Self::RayQuery => "ray-query",
+        })
+    }
+}
+
+/// How the shader reads the scene arrays (macro ARRAY_FORM).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum ArrayForm {
+    /// rgba32ui texel buffers: the cheapest divergent load on software devices.
+    TexelBuffer = 0,
+    /// Storage buffers.
+    StorageBuffer = 1,
+    /// Buffer device addresses: no limit but memory.
+    DeviceAddress = 2,
+}
+
+impl std::fmt::Display for ArrayForm {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::TexelBuffer => "texel-buffer",
+            Self::StorageBuffer => "storage-buffer",
+            Self::DeviceAddress => "device-address",
+        })
+    }
+}
+
+/// What a binding holds.
+#[derive(Clone, Copy)]
+pub enum BindingResource<'a> {
+    /// One uniform buffer.
+    Uniform(&'a Buffer),
+    /// One storage buffer.
+    Storage(&'a Buffer),
+    /// An array of storage buffers.
+    StorageArray(&'a [&'a Buffer]),
+    /// An array of texel buffers.
+    TexelArray(&'a [&'a Buffer]),
+    /// The top-level acceleration structure.
+    AccelerationStructure(&'a AccelerationStructures),
+}
+
+impl BindingResource<'_> {
+    fn descriptor_type(&self) -> vk::DescriptorType {
+        match self {
+            Self::Uniform(_) => vk::DescriptorType::UNIFORM_BUFFER,
+            Self::Storage(_) | Self::StorageArray(_) => vk::DescriptorType::STORAGE_BUFFER,
+            Self::TexelArray(_) => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            Self::AccelerationStructure(_) => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
+        }
+    }
+
+    fn count(&self) -> u32 {
+        match self {
+            Self::StorageArray(buffers) | Self::TexelArray(buffers) => u32::try_from(buffers.len()).unwrap_or(u32::MAX),
+            _ => 1,
+        }
+    }
+}
+
+/// What a kernel is made from.
+pub struct KernelDescription<'a> {
+    /// Name for messages.
+    pub name: &'a str,
+    /// The shader.
+    pub spirv: &'a [u32],
+    /// Lanes of a workgroup (specialisation constant 0).
+    pub workgroup_size: u32,
+    /// Further specialisation constants: id and value.
+    pub constants: &'a [(u32, u32)],
+    /// Bytes of push constants.
+    pub push_constant_bytes: u32,
+    /// For each set of resources, the bindings 0, 1, 2, …: all sets have the same types.
+    pub sets: &'a [&'a [BindingResource<'a>]],
+}
+
+/// A pipeline with its sets of resources.
+pub struct Kernel {
+    /// Name for messages.
+    pub name: String,
+    /// Lanes of a workgroup.
+    pub workgroup_size: u32,
+    pub(super) pipeline: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
+    pub(super) sets: Vec<vk::DescriptorSet>,
+    set_layout: vk::DescriptorSetLayout,
+    pool: vk::DescriptorPool,
+    gpu: Arc<Gpu>,
+}
+
+impl Kernel {
+    /// Compiles the kernel and fills its sets.
+    ///
+    /// # Errors
+    /// When the driver refuses the shader or memory runs out.
+    pub fn new(gpu: &Arc<Gpu>, description: &KernelDescription<'_>) -> GpuResult<Self> {
+        // Owned from the start, so that an error on the way frees what was made (null handles are ignored by Vulkan).
+        let mut kernel = Self {
+            name: description.name.to_owned(),
+            workgroup_size: description.workgroup_size,
+            pipeline: vk::Pipeline::null(),
+            layout: vk::PipelineLayout::null(),
+            sets: Vec::new(),
+            set_layout: vk::DescriptorSetLayout::null(),
+            pool: vk::DescriptorPool::null(),
+            gpu: gpu.clone(),
+        };
+        kernel.create_layouts(description)?;
+        kernel.create_pipeline(description)?;
+        kernel.create_sets(description)?;
+        Ok(kernel)
+    }
+
+    fn create_layouts(&mut self, description: &KernelDescription<'_>) -> GpuResult<()> {
+        let device = &self.gpu.device;
+        let bindings: Vec<_> = description.sets[0]
+            .iter()
+            .zip(0..)
+            .map(|(resource, binding)| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding)
+                    .descriptor_type(resource.descriptor_type())
+                    .descriptor_count(resource.count())
+                    .stage_flags(vk::ShaderStageFlags::COMPUTE)
+            })
+            .collect();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: the device is alive and the pointers outlive the calls.
+        unsafe {
+            self.set_layout = device
+                .create_descriptor_set_layout(&info, None)
+                .map_err(GpuError::call("vkCreateDescriptorSetLayout", &self.name))?;
+            let range = [vk::PushConstantRange::default()
+                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+                .size(description.push_constant_bytes)];
+            let layouts = [self.set_layout];
+            let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
+            if description.push_constant_bytes > 0 {
+                info = info.push_constant_ranges(&range);
+            }
+            self.layout = device
+                .create_pipeline_layout(&info, None)
+                .map_err(GpuError::call("vkCreatePipelineLayout", &self.name))?;
+        }
+        Ok(())
+    }
+
+    fn create_pipeline(&mut self, description: &KernelDescription<'_>) -> GpuResult<()> {
+        let device = &self.gpu.device;
+        let mut constants = vec![(0, description.workgroup_size)];
+        constants.extend_from_slice(description.constants);
+        let entries: Vec<_> = constants
+            .iter()
+            .zip(0u32..)
+            .map(|((id, _), i)| vk::SpecializationMapEntry::default().constant_id(*id).offset(4 * i).size(4))
+            .collect();
+        let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
+        let specialization =
+            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
+        let module_info = vk::ShaderModuleCreateInfo::default().code(description.spirv);
+        // SAFETY: the SPIR-V is from our compiler; all pointers outlive the calls; the module may go once the pipeline
+        // is made.
+        unsafe {
+            let module = device
+                .create_shader_module(&module_info, None)
+                .map_err(GpuError::call("vkCreateShaderModule", &self.name))?;
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module)
+                .name(c"main")
+                .specialization_info(&specialization);
+            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
+            let pipelines = device.create_compute_pipelines(vk::PipelineCache::null(), &info, None);
+            device.destroy_shader_module(module, None);
+            self.pipeline =
+                pipelines.map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", &self.name)(result))?[0];
+        }
+        Ok(())
+    }
+
+    fn create_sets(&mut self, description: &KernelDescription<'_>) -> GpuResult<()> {
+        let device = &self.gpu.device;
+        let set_count = u32::try_from(description.sets.len()).unwrap_or(u32::MAX);
+        let sizes: Vec<_> = description.sets[0]
+            .iter()
+            .map(|r| vk::DescriptorPoolSize::default().ty(r.descriptor_type()).descriptor_count(r.count() * set_count))
+            .collect();
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(set_count).pool_sizes(&sizes);
+        // SAFETY: the device is alive; the pool is sized for exactly these sets.
+        unsafe {
+            self.pool = device
+                .create_descriptor_pool(&info, None)
+                .map_err(GpuError::call("vkCreateDescriptorPool", &self.name))?;
+            let layouts = vec![self.set_layout; description.sets.len()];
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
+            self.sets = device
+                .allocate_descriptor_sets(&info)
+                .map_err(GpuError::call("vkAllocateDescriptorSets", &self.name))?;
+        }
+        for (set, resources) in self.sets.iter().zip(description.sets) {
+            for (resource, binding) in resources.iter().zip(0..) {
+                self.write_binding(*set, binding, *resource);
+            }
+        }
+        Ok(())
+    }
+
+    fn write_binding(&self, set: vk::DescriptorSet, binding: u32, resource: BindingResource<'_>) {
+        let mut structures = vk::WriteDescriptorSetAccelerationStructureKHR::default();
+        let structure_handles;
+        let mut buffers = Vec::new();
+        let mut views = Vec::new();
+        let whole = |b: &Buffer| vk::DescriptorBufferInfo::default().buffer(b.raw).range(vk::WHOLE_SIZE);
+        match resource {
+            BindingResource::Uniform(b) | BindingResource::Storage(b) => buffers.push(whole(b)),
+            BindingResource::StorageArray(all) => buffers.extend(all.iter().map(|b| whole(b))),
+            BindingResource::TexelArray(all) => views.extend(all.iter().map(|b| b.texel_view())),
+            BindingResource::AccelerationStructure(_) => {}
+        }
+        let mut write = vk::WriteDescriptorSet::default()
+            .dst_set(set)
+            .dst_binding(binding)
+            .descriptor_type(resource.descriptor_type())
+            .buffer_info(&buffers)
+            .texel_buffer_view(&views);
+        write.descriptor_count = resource.count();
+        if let BindingResource::AccelerationStructure(a) = resource {
+            structure_handles = [a.top_level()];
+            structures = structures.acceleration_structures(&structure_handles);
+            write = write.push_next(&mut structures);
+        }
+        // SAFETY: the set belongs to this kernel and is in no submitted work; resources outlive the kernel's use.
+        unsafe { self.gpu.device.update_descriptor_sets(&[write], &[]) };
+    }
+}
+
+impl Drop for Kernel {
+    fn drop(&mut self) {
+        // SAFETY: submissions wait before they go, so no work uses the pipeline; null handles are allowed.
+        unsafe {
+            self.gpu.device.destroy_pipeline(self.pipeline, None);
+            self.gpu.device.destroy_pipeline_layout(self.layout, None);
+            self.gpu.device.destroy_descriptor_pool(self.pool, None);
+            self.gpu.device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Vulkan behind small RAII types: devices, memory, buffers, kernels, acceleration structures, and the one place that
+//! submits work and waits for it. It knows nothing of scenes.
+#![allow(unsafe_code, reason = "this is the one module that calls Vulkan; each block states why it is sound")]
+
+mod acceleration_structure;
+mod buffer;
+mod device;
+mod enumerate;
+mod error;
+mod instance;
+mod kernel;
+pub mod shader_compiler;
+mod submit;
+
+pub use acceleration_structure::{AccelerationStructures, InstanceGeometry, MeshGeometry};
+pub use buffer::{Buffer, MemoryUse};
+pub use device::{DeviceRequirements, Gpu};
+pub use enumerate::{DeviceInfo, DeviceKind, DeviceLimits, DeviceSelection, devices, select};
+pub use error::{GpuError, GpuResult};
+pub use instance::{Instance, take_validation_messages, validation_is_available};
+pub use kernel::{ArrayForm, BindingResource, Kernel, KernelDescription, TraceBackend};
+pub use submit::{Dispatch, Submission};
+
+/// The shaders compiled by build.rs.
+pub mod embedded {
+    include!(concat!(env!("OUT_DIR"), "/embedded_shaders.rs"));
+}

@@ -1,0 +1,111 @@
+//! The four-wide tree in slots: the binary tree collapsed, children in groups of four.
+
+use bytemuck::Zeroable;
+
+use super::binary::Node;
+use super::quantise::inner_slot;
+use crate::layout::{LeafSlot, SLOT_GROUP, SLOT_LEAF, Texel};
+use crate::prepare::PrepareError;
+use crate::prepare::bounds::Bounds;
+
+/// A slot as it lies in the array.
+pub type Slot = [Texel; 3];
+
+/// Traversal packs a group index and the ordered list of its children into one word; this many bits are the index.
+pub const GROUP_BITS: u32 = 25;
+
+/// What a tree became.
+#[derive(Clone, Copy, Debug)]
+pub struct Appended {
+    /// Slot of the root.
+    pub root_slot: u32,
+    /// Inner slots on the longest path, 1 or more.
+    pub depth: u32,
+    /// Number of inner slots.
+    pub inner_slots: u32,
+    /// Slots that a random ray through the root's box is expected to visit: Σ area / root area over all slots.
+    pub sah_cost: f64,
+}
+
+/// The slot of an absent child.
+pub fn empty_slot() -> Slot {
+    bytemuck::cast(LeafSlot { kind: SLOT_LEAF, ..LeafSlot::zeroed() })
+}
+
+/// Whether a slot is a triangle that is there.
+pub fn is_triangle(slot: &Slot) -> bool {
+    slot[2][3] & SLOT_LEAF != 0 && *slot != empty_slot()
+}
+
+/// Appends a tree to `slots`: a group that holds only the root, which is always an inner slot, then the others.
+/// `leaf` makes the slot of a primitive and is told where it will be.
+pub(super) fn append(
+    slots: &mut Vec<Slot>,
+    nodes: &[Node],
+    mut leaf: impl FnMut(u32, u32) -> Slot,
+) -> Result<Appended, PrepareError> {
+    let root = allocate_group(slots)? * SLOT_GROUP;
+    // Inner nodes whose slot is allocated but not written yet.
+    let mut pending = vec![(0u32, root, 1u32)];
+    let mut appended = Appended { root_slot: root, depth: 0, inner_slots: 0, sah_cost: 1.0 };
+    let root_area = nodes.first().map_or(0.0, |root| f64::from(root.half_area()));
+    let relative_area = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
+    while let Some((node, slot, depth)) = pending.pop() {
+        appended.inner_slots += 1;
+        appended.depth = appended.depth.max(depth);
+        let (children, count) = children(nodes, node);
+        let children = &children[..count];
+        let group = allocate_group(slots)?;
+        let mut boxes = [Bounds::EMPTY; SLOT_GROUP as usize];
+        for (index, &child) in children.iter().enumerate() {
+            boxes[index] = nodes[child as usize].bounds();
+        }
+        slots[slot as usize] = bytemuck::cast(inner_slot(&boxes[..count], group));
+        // In reverse, so that the first child's subtree comes next to its parent.
+        for (index, &child) in children.iter().enumerate().rev() {
+            let place = group * SLOT_GROUP + index as u32;
+            let node = &nodes[child as usize];
+            appended.sah_cost += f64::from(node.half_area()) * relative_area;
+            if node.is_leaf() {
+                slots[place as usize] = leaf(node.right_or_primitive, place);
+            } else {
+                pending.push((child, place, depth + 1));
+            }
+        }
+    }
+    Ok(appended)
+}
+
+fn allocate_group(slots: &mut Vec<Slot>) -> Result<u32, PrepareError> {
+    let group = slots.len() / SLOT_GROUP as usize;
+    if group >= 1 << GROUP_BITS {
+        return Err(PrepareError::TooManySlots);
+    }
+    slots.resize(slots.len() + SLOT_GROUP as usize, empty_slot());
+    Ok(group as u32)
+}
+
+/// Up to four nodes that stand for `node`: its children, the one of the largest area replaced by its own children
+/// while there is room.
+fn children(nodes: &[Node], node: u32) -> ([u32; 4], usize) {
+    let mut children = [0; 4];
+    let Some(root) = nodes.get(node as usize) else { return (children, 0) };
+    if root.is_leaf() {
+        children[0] = node;
+        return (children, 1);
+    }
+    children[..2].copy_from_slice(&[node + 1, node + root.right_or_primitive]);
+    let mut count = 2;
+    while count < 4 {
+        let largest = (0..count).filter(|&index| !nodes[children[index] as usize].is_leaf()).max_by(|&a, &b| {
+            let (a, b) = (&nodes[children[a] as usize], &nodes[children[b] as usize]);
+            a.half_area().total_cmp(&b.half_area()).then(a.leaves.cmp(&b.leaves))
+        });
+        let Some(largest) = largest else { break };
+        let opened = children[largest];
+        children[largest] = opened + 1;
+        children[count] = opened + nodes[opened as usize].right_or_primitive;
+        count += 1;
+    }
+    (children, count)
+}

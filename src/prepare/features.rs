@@ -1,0 +1,79 @@
+//! What a scene needs: the part of the kernel key that the scene decides. What is not needed is not loaded, not compiled
+//! and not run.
+
+use super::environment::EnvironmentKind;
+use crate::layout::{
+    BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, LIGHT_DIRECTIONAL,
+    LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE,
+};
+
+/// The features of a kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Features {
+    /// Bit `1 << BSDF_*` for each scattering model in use.
+    pub bsdfs: u32,
+    /// Bit `1 << LIGHT_*` for each kind of light that is sampled.
+    pub lights: u32,
+    /// Any texture.
+    pub textures: bool,
+    /// Any emission texture.
+    pub emission_textures: bool,
+    /// Two-level traversal.
+    pub instances: bool,
+    /// Any triangle with shading normals.
+    pub normals: bool,
+    /// Any emissive surface, sampled or not.
+    pub emission: bool,
+    /// Any metallic-roughness surface that transmits (thin-walled).
+    pub transmission: bool,
+    /// Any surface with a black back.
+    pub black_back: bool,
+    /// Any glass with Schlick's Fresnel term.
+    pub schlick: bool,
+    /// What rays see that leave the scene.
+    pub environment: EnvironmentKind,
+    /// The environment is picked by its CDFs.
+    pub environment_importance: bool,
+}
+
+impl Features {
+    /// Every feature's name, and whether it is in.
+    fn list(&self) -> Vec<(&'static str, bool)> {
+        let bsdf = |kind: u32| self.bsdfs & (1 << kind) != 0;
+        let light = |kind: u32| self.lights & (1 << kind) != 0;
+        vec![
+            ("lambertian", bsdf(BSDF_LAMBERTIAN)),
+            ("mirror", bsdf(BSDF_MIRROR)),
+            ("refract", bsdf(BSDF_REFRACT)),
+            ("glass", bsdf(BSDF_GLASS)),
+            ("schlick", self.schlick),
+            ("metallic-roughness", bsdf(BSDF_METALLIC_ROUGHNESS)),
+            ("transmission", self.transmission),
+            ("unlit", bsdf(BSDF_UNLIT)),
+            ("black-back", self.black_back),
+            ("emission", self.emission),
+            ("textures", self.textures),
+            ("emission-textures", self.emission_textures),
+            ("normals", self.normals),
+            ("instances", self.instances),
+            ("triangle-lights", light(LIGHT_TRIANGLE)),
+            ("point-lights", light(LIGHT_POINT)),
+            ("spot-lights", light(LIGHT_SPOT)),
+            ("directional-lights", light(LIGHT_DIRECTIONAL)),
+            ("environment-light", light(LIGHT_ENVIRONMENT)),
+            ("constant-environment", self.environment == EnvironmentKind::Constant),
+            ("image-environment", self.environment == EnvironmentKind::Image),
+            ("environment-importance", self.environment_importance),
+        ]
+    }
+
+    /// Names of the features that are in.
+    pub fn kept(&self) -> Vec<&'static str> {
+        self.list().into_iter().filter(|(_, kept)| *kept).map(|(name, _)| name).collect()
+    }
+
+    /// Names of the features that are left out.
+    pub fn dropped(&self) -> Vec<&'static str> {
+        self.list().into_iter().filter(|(_, kept)| !kept).map(|(name, _)| name).collect()
+    }
+}

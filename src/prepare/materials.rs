@@ -1,0 +1,148 @@
+//! The materials in use as the shader reads them, and the textures they need.
+
+use super::PrepareError;
+use super::emission::EmissionMap;
+use super::features::Features;
+use super::textures::{ColorSpace, TextureTable};
+use crate::layout::{
+    BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_BLACK_BACK,
+    MATERIAL_DOUBLE_SIDED, MATERIAL_SCHLICK, Material, NONE, SLOT_MATERIAL_MASK,
+};
+use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding};
+
+/// The material table, with what later stages ask of a material.
+#[derive(Debug, Default)]
+pub(super) struct MaterialTable {
+    /// Records by the index that leaf slots hold.
+    pub records: Vec<Material>,
+    /// By index of the scene's material.
+    uses: Vec<Option<MaterialUse>>,
+    /// By index of the record: the emission texture, if the surface emits by one.
+    emission_maps: Vec<Option<EmissionMap>>,
+}
+
+/// What geometry must know of its material.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MaterialUse {
+    /// Index of the record.
+    pub record: u32,
+    /// Some texture is looked up.
+    pub textured: bool,
+    /// Shading normals matter.
+    pub shaded: bool,
+    /// It emits somewhere, and its triangles are lights.
+    pub emissive: bool,
+}
+
+impl MaterialTable {
+    /// Collects the materials that instanced meshes refer to, in order of first use.
+    ///
+    /// # Errors
+    /// If there are more materials or texels than the layout can index.
+    pub(super) fn new(scene: &Scene, textures: &mut TextureTable) -> Result<Self, PrepareError> {
+        let mut table = Self { uses: vec![None; scene.materials.len()], ..Self::default() };
+        let mut seen = vec![false; scene.meshes.len()];
+        for instance in &scene.instances {
+            if std::mem::replace(&mut seen[instance.mesh], true) {
+                continue;
+            }
+            for primitive in scene.meshes[instance.mesh].primitives.iter().filter(|p| !p.triangles.is_empty()) {
+                if table.uses[primitive.material].is_none() {
+                    let used = table.add(scene, &scene.materials[primitive.material], textures)?;
+                    table.uses[primitive.material] = Some(used);
+                }
+            }
+        }
+        Ok(table)
+    }
+
+    /// What a material of the scene that is in use became.
+    pub(super) fn used(&self, material: usize) -> MaterialUse {
+        self.uses[material].expect("every placed primitive's material was collected")
+    }
+
+    /// The emission texture of a record.
+    pub(super) fn emission_map(&self, record: u32) -> Option<&EmissionMap> {
+        self.emission_maps[record as usize].as_ref()
+    }
+
+    /// Adds what the materials need.
+    pub(super) fn add_features(&self, features: &mut Features) {
+        for record in &self.records {
+            features.bsdfs |= 1 << (record.kind_flags & crate::layout::MATERIAL_KIND_MASK);
+            features.textures |=
+                [record.base_color_texture, record.metallic_roughness_texture, record.emission_texture]
+                    .iter()
+                    .any(|&texture| texture != NONE);
+            features.emission_textures |= record.emission_texture != NONE;
+            features.emission |= record.emission != [0.0; 3];
+            features.transmission |= record.transmission > 0.0;
+            features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
+            features.schlick |= record.kind_flags & MATERIAL_SCHLICK != 0;
+        }
+    }
+
+    fn add(
+        &mut self,
+        scene: &Scene,
+        material: &scene::Material,
+        textures: &mut TextureTable,
+    ) -> Result<MaterialUse, PrepareError> {
+        let index = self.records.len() as u32;
+        if index > SLOT_MATERIAL_MASK {
+            return Err(PrepareError::TooManyMaterials);
+        }
+        let mut bind = |binding: Option<TextureBinding>, needed: bool, space: ColorSpace| match binding {
+            Some(binding) if needed => textures.add(scene, binding.texture, space),
+            _ => Ok(NONE),
+        };
+        let rough = material.bsdf == Bsdf::MetallicRoughness;
+        // KHR_materials_unlit: emission is ignored.
+        let may_emit = material.is_emissive() && material.bsdf != Bsdf::Unlit;
+        let map = match material.emission_texture {
+            Some(binding) if may_emit => Some(EmissionMap::new(scene, binding.texture, material.emission)),
+            _ => None,
+        };
+        let emissive = may_emit && !map.as_ref().is_some_and(EmissionMap::is_black);
+        let record = Material {
+            base_color: material.base_color,
+            kind_flags: kind_flags(material),
+            emission: if emissive { material.emission } else { [0.0; 3] },
+            roughness: material.roughness,
+            metallic: material.metallic,
+            ior: material.ior,
+            transmission: if rough { material.transmission } else { 0.0 },
+            base_color_texture: bind(material.base_color_texture, material.base_color != [0.0; 3], ColorSpace::Srgb)?,
+            metallic_roughness_texture: bind(material.metallic_roughness_texture, rough, ColorSpace::Linear)?,
+            emission_texture: bind(material.emission_texture, emissive, ColorSpace::Srgb)?,
+            unused: [0; 2],
+        };
+        let textured = [record.base_color_texture, record.metallic_roughness_texture, record.emission_texture]
+            .iter()
+            .any(|&texture| texture != NONE);
+        self.records.push(record);
+        self.emission_maps.push(map.filter(|_| emissive));
+        Ok(MaterialUse { record: index, textured, shaded: material.bsdf != Bsdf::Unlit, emissive })
+    }
+}
+
+fn kind_flags(material: &scene::Material) -> u32 {
+    let mut bits = match material.bsdf {
+        Bsdf::Lambertian => BSDF_LAMBERTIAN,
+        Bsdf::Mirror => BSDF_MIRROR,
+        Bsdf::Refract => BSDF_REFRACT,
+        Bsdf::Glass => BSDF_GLASS,
+        Bsdf::MetallicRoughness => BSDF_METALLIC_ROUGHNESS,
+        Bsdf::Unlit => BSDF_UNLIT,
+    };
+    if material.black_back {
+        // A black back emits nothing, whatever else is said.
+        bits |= MATERIAL_BLACK_BACK;
+    } else if material.double_sided {
+        bits |= MATERIAL_DOUBLE_SIDED;
+    }
+    if material.bsdf == Bsdf::Glass && material.fresnel == Fresnel::Schlick {
+        bits |= MATERIAL_SCHLICK;
+    }
+    bits
+}

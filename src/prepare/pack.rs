@@ -1,0 +1,137 @@
+//! Joins what the stages made into the arrays and constants of the layout.
+
+use bytemuck::Pod;
+
+use super::acceleration::Acceleration;
+use super::environment::PreparedEnvironment;
+use super::features::Features;
+use super::geometry::Geometry;
+use super::lights::LightTable;
+use super::materials::MaterialTable;
+use super::textures::TextureTable;
+use super::{PreparedInstance, Statistics};
+use crate::layout::{RenderConstants, SCENE_ARRAYS, TRIANGLE_NORMALS, Texel};
+
+/// Words in texels of four, the last padded with zeros.
+pub(super) fn pack_words(words: &[u32]) -> Vec<Texel> {
+    words
+        .chunks(4)
+        .map(|chunk| {
+            let mut texel = Texel::default();
+            texel[..chunk.len()].copy_from_slice(chunk);
+            texel
+        })
+        .collect()
+}
+
+/// The same from chunks of anything: word k of a chunk is `word(chunk, k)`.
+pub(super) fn pack<T>(chunks: impl Iterator<Item = T>, word: impl Fn(&T, usize) -> u32) -> Vec<Texel> {
+    chunks.map(|chunk| [0, 1, 2, 3].map(|k| word(&chunk, k))).collect()
+}
+
+/// Appends records and returns the texel where they start.
+fn append<T: Pod>(array: &mut Vec<Texel>, records: &[T]) -> u32 {
+    let first = array.len() as u32;
+    array.extend_from_slice(bytemuck::cast_slice(records));
+    first
+}
+
+/// The arrays, and the scene's part of the constants.
+pub(super) fn pack_arrays(
+    geometry: Geometry,
+    acceleration: Acceleration,
+    materials: &MaterialTable,
+    textures: TextureTable,
+    environment: PreparedEnvironment,
+    lights: &LightTable,
+) -> ([Vec<Texel>; SCENE_ARRAYS], RenderConstants) {
+    let bounds = acceleration.bounds.to_f64();
+    let mut attributes = Vec::new();
+    append(&mut attributes, &geometry.attributes.triangles);
+    let vertices = append(&mut attributes, &geometry.attributes.vertices);
+    let mut tables = Vec::new();
+    let (sin, cos) = environment.rotation_radians.sin_cos();
+    let constants = RenderConstants {
+        vertices,
+        root_slot: acceleration.meshes.first().map_or(0, |world| world.root_slot),
+        materials: append(&mut tables, &materials.records),
+        textures: append(&mut tables, &textures.headers),
+        lights: append(&mut tables, &lights.records),
+        instances: append(&mut tables, &acceleration.instances),
+        light_cdf_word: 4 * append(&mut tables, &pack_words(&lights.cdf())),
+        light_count: lights.records.len() as u32,
+        environment_light: lights.environment,
+        environment_width: environment.width,
+        environment_height: environment.height,
+        environment_marginal_word: environment.marginal_word,
+        environment_conditional_word: environment.conditional_word,
+        environment_radiance: environment.radiance,
+        environment_cos: cos as f32,
+        environment_sin: sin as f32,
+        scene_center: bounds.center().as_vec3().into(),
+        ..RenderConstants::default()
+    };
+    let slots = acceleration.slots.into_flattened();
+    let mut arrays = [slots, attributes, tables, textures.texels, environment.array];
+    // A buffer of no bytes is not allowed.
+    for array in arrays.iter_mut().filter(|array| array.is_empty()) {
+        array.push(Texel::default());
+    }
+    (arrays, constants)
+}
+
+/// What the scene needs of the kernel.
+pub(super) fn features(
+    geometry: &Geometry,
+    acceleration: &Acceleration,
+    materials: &MaterialTable,
+    environment: &PreparedEnvironment,
+    lights: &LightTable,
+) -> Features {
+    let mut features = Features {
+        lights: lights.kinds(),
+        instances: !acceleration.instances.is_empty(),
+        normals: geometry.attributes.triangles.iter().any(|triangle| triangle.flags & TRIANGLE_NORMALS != 0),
+        environment: environment.kind,
+        environment_importance: environment.conditional_word != 0,
+        ..Features::default()
+    };
+    materials.add_features(&mut features);
+    features
+}
+
+/// The figures that the trees and lights give.
+pub(super) fn statistics(acceleration: &Acceleration, lights: &LightTable) -> Statistics {
+    let half_area = |size: glam::DVec3| size.x * size.y + size.y * size.z + size.z * size.x;
+    let root_area = half_area(acceleration.bounds.to_f64().half_extent());
+    let Some((world, shared)) = acceleration.meshes.split_first() else { return Statistics::default() };
+    let mut statistics = Statistics {
+        triangles: acceleration.meshes.iter().map(|mesh| u64::from(mesh.triangles)).sum(),
+        placed_triangles: world.triangles.into(),
+        instances: acceleration.instances.len() as u64,
+        inner_slots: acceleration.meshes.iter().map(|mesh| u64::from(mesh.inner_slots)).sum(),
+        depth: world.depth + shared.iter().map(|mesh| mesh.depth).max().unwrap_or(0),
+        sah_cost: world.sah_cost,
+        lights: lights.records.len() as u64,
+        ..Statistics::default()
+    };
+    for (&mesh, bounds) in acceleration.instance_meshes.iter().zip(&acceleration.instance_bounds) {
+        let mesh = &acceleration.meshes[mesh];
+        statistics.placed_triangles += u64::from(mesh.triangles);
+        if root_area > 0.0 {
+            statistics.sah_cost += half_area(bounds.to_f64().half_extent()) / root_area * mesh.sah_cost;
+        }
+    }
+    statistics
+}
+
+/// The instances with where they come from.
+pub(super) fn prepared_instances(acceleration: &Acceleration) -> Vec<PreparedInstance> {
+    acceleration
+        .instances
+        .iter()
+        .zip(&acceleration.instance_meshes)
+        .zip(&acceleration.instance_sources)
+        .map(|((&record, &mesh), &source)| PreparedInstance { record, mesh, source })
+        .collect()
+}

@@ -1,0 +1,98 @@
+//! Textures as the shader reads them: headers in the tables, texels in one array, each image once.
+
+use std::collections::HashMap;
+
+use super::PrepareError;
+use crate::layout::{
+    TEXTURE_16_BIT, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT, Texel, TextureHeader,
+};
+use crate::scene::{Filter, Image, Scene, Texels, Texture, Wrap};
+
+/// How a texture's numbers are to be read, which follows from what it is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum ColorSpace {
+    /// sRGB-encoded colour.
+    Srgb,
+    /// Plain numbers.
+    Linear,
+}
+
+/// The textures in use.
+#[derive(Debug, Default)]
+pub(super) struct TextureTable {
+    /// Headers by the index that materials hold.
+    pub headers: Vec<TextureHeader>,
+    /// The texel array, packed words.
+    pub texels: Vec<Texel>,
+    images: HashMap<usize, u32>,
+    /// By (image, sampling bits): textures that read the same words in the same way are one.
+    known: HashMap<(usize, u32), u32>,
+}
+
+impl TextureTable {
+    /// Index of the header for a texture of the scene in the given use; its image is stored at the first use.
+    ///
+    /// # Errors
+    /// If the texels of all images are more words than 32 bits can address.
+    pub(super) fn add(&mut self, scene: &Scene, texture: usize, space: ColorSpace) -> Result<u32, PrepareError> {
+        let texture = &scene.textures[texture];
+        let image = &scene.images[texture.image];
+        let sampling = sampling_bits(texture, image, space);
+        if let Some(&index) = self.known.get(&(texture.image, sampling)) {
+            return Ok(index);
+        }
+        let first_word = self.store(texture.image, image)?;
+        let index = self.headers.len() as u32;
+        self.headers.push(TextureHeader { first_word, width: image.width, height: image.height, sampling });
+        self.known.insert((texture.image, sampling), index);
+        Ok(index)
+    }
+
+    fn store(&mut self, index: usize, image: &Image) -> Result<u32, PrepareError> {
+        if let Some(&word) = self.images.get(&index) {
+            return Ok(word);
+        }
+        let first_word = u32::try_from(4 * self.texels.len()).map_err(|_| PrepareError::TooManyTexels)?;
+        let packed = match &image.texels {
+            Texels::Rgba8(texels) => {
+                super::pack(texels.chunks(4), |texels, k| texels.get(k).map_or(0, |t| u32::from_le_bytes(*t)))
+            }
+            Texels::Rgba16(texels) => super::pack(texels.chunks(2), |texels, k| {
+                texels.get(k / 2).map_or(0, |t| {
+                    let half = 2 * (k % 2);
+                    u32::from(t[half]) | u32::from(t[half + 1]) << 16
+                })
+            }),
+        };
+        if 4 * (self.texels.len() + packed.len()) as u64 > u64::from(u32::MAX) {
+            return Err(PrepareError::TooManyTexels);
+        }
+        self.texels.extend(packed);
+        self.images.insert(index, first_word);
+        Ok(first_word)
+    }
+}
+
+fn sampling_bits(texture: &Texture, image: &Image, space: ColorSpace) -> u32 {
+    let wrap = |wrap: Wrap| match wrap {
+        Wrap::Repeat => 0,
+        Wrap::MirroredRepeat => 1,
+        Wrap::ClampToEdge => 2,
+    };
+    let mut bits = wrap(texture.wrap_u) << TEXTURE_WRAP_U_SHIFT | wrap(texture.wrap_v) << TEXTURE_WRAP_V_SHIFT;
+    if space == ColorSpace::Srgb {
+        bits |= TEXTURE_SRGB;
+    }
+    if matches!(image.texels, Texels::Rgba16(_)) {
+        bits |= TEXTURE_16_BIT;
+    }
+    if texture.filter == Filter::Nearest {
+        bits |= TEXTURE_NEAREST;
+    }
+    bits
+}
+
+/// The sRGB transfer function of IEC 61966-2-1, encoded value to linear.
+pub fn srgb_to_linear(encoded: f64) -> f64 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}

@@ -1,0 +1,116 @@
+//! The kernel key: everything that decides which code runs. One key, one kernel.
+
+use std::fmt;
+
+use super::{EnvSampling, Integrator, LightSampling, MisHeuristic, Settings};
+use crate::gpu::{ArrayForm, TraceBackend};
+use crate::prepare::{EnvironmentKind, Features, Prepared};
+use crate::scene::{Camera, Projection};
+
+/// Version of the BVH's node layout; part of the key.
+const NODE_LAYOUT: &str = "bvh4-q8";
+
+/// What a path-tracing kernel is built with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct KernelKey {
+    /// Trace back end.
+    pub trace: TraceBackend,
+    /// How scene arrays are read.
+    pub array_form: ArrayForm,
+    /// log2 of the texels of a chunk; 31 if nothing is split.
+    pub chunk_shift: u32,
+    /// Entries of the traversal stack that may lie in memory.
+    pub stack_size: u32,
+    /// What the scene needs.
+    pub features: Features,
+    /// A thin lens.
+    pub lens: bool,
+    /// An orthographic camera.
+    pub orthographic: bool,
+    /// What is added up.
+    pub integrator: Integrator,
+    /// How light is looked for.
+    pub light_sampling: LightSampling,
+    /// How two samples are weighed.
+    pub mis_heuristic: MisHeuristic,
+    /// How environment directions are drawn.
+    pub env_sampling: EnvSampling,
+}
+
+impl KernelKey {
+    /// The key for a prepared scene seen by a camera.
+    pub fn new(
+        prepared: &Prepared,
+        camera: &Camera,
+        settings: &Settings,
+        trace: TraceBackend,
+        (array_form, chunk_shift): (ArrayForm, u32),
+    ) -> Self {
+        Self {
+            trace,
+            array_form,
+            chunk_shift,
+            // An entry an inner slot of the path, and one more to leave the instance.
+            stack_size: prepared.statistics.depth + 2,
+            features: prepared.features,
+            lens: camera.lens_radius > 0.0,
+            orthographic: matches!(camera.projection, Projection::Orthographic { .. }),
+            integrator: settings.integrator,
+            light_sampling: settings.light_sampling,
+            mis_heuristic: settings.mis_heuristic,
+            env_sampling: settings.env_sampling,
+        }
+    }
+
+    /// The specialisation constants of shaders/include/features.glsl.
+    pub fn specialization(&self) -> Vec<(u32, u32)> {
+        let f = &self.features;
+        let flags = [
+            f.textures,
+            f.instances,
+            f.normals,
+            f.environment == EnvironmentKind::Constant,
+            f.environment == EnvironmentKind::Image,
+            self.lens,
+            self.orthographic,
+            f.black_back,
+        ];
+        let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
+        let integrator = match self.integrator {
+            Integrator::Path => 7,
+            Integrator::Emission => 1,
+            Integrator::Direct => 2,
+            Integrator::Indirect => 4,
+        };
+        vec![
+            (1, self.chunk_shift),
+            (2, f.bsdfs),
+            (3, f.lights),
+            (4, features),
+            (5, integrator),
+            (6, self.light_sampling as u32),
+            (7, self.mis_heuristic as u32),
+            (8, self.env_sampling as u32),
+            (9, self.stack_size),
+        ]
+    }
+}
+
+impl fmt::Display for KernelKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} {} {NODE_LAYOUT} chunk:{} stack:{}",
+            self.trace, self.array_form, self.chunk_shift, self.stack_size
+        )?;
+        write!(f, " {} {} {} {}", self.integrator, self.light_sampling, self.mis_heuristic, self.env_sampling)?;
+        write!(f, " [{}]", self.features.kept().join(" "))?;
+        if self.lens {
+            f.write_str(" lens")?;
+        }
+        if self.orthographic {
+            f.write_str(" orthographic")?;
+        }
+        Ok(())
+    }
+}

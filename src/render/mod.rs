@@ -1,0 +1,109 @@
+//! Rendering: what is asked for ([`Settings`]), how it goes on ([`ProgressUpdate`]) and what comes out ([`RenderResult`]).
+
+mod function_kernel;
+mod kernel_key;
+mod open;
+mod path_tracer;
+mod progress;
+mod result;
+mod scene_buffers;
+mod settings;
+mod slices;
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+pub use function_kernel::FunctionCall;
+pub use kernel_key::KernelKey;
+pub use open::{OpenDevice, choose_trace, open_device};
+pub use path_tracer::{BindingOverride, PathTracer, Run};
+pub use progress::ProgressUpdate;
+pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
+pub use scene_buffers::choose_array_form;
+pub use settings::{
+    DeviceChoice, EnvSampling, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings,
+    TraceChoice, choose_camera,
+};
+
+use crate::film::metadata::{world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective};
+use crate::prepare::{self, EnvironmentSampling, PrepareOptions, Prepared};
+use crate::scene::{Camera, Projection, Scene};
+use crate::{Error, Result};
+
+/// Prepares a scene for a camera and the settings.
+///
+/// # Errors
+/// [`Error::Usage`] if the scene does not fit the layout.
+pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Prepared> {
+    let options = PrepareOptions {
+        camera: camera.camera_to_world.translation,
+        environment_sampling: match settings.env_sampling {
+            EnvSampling::Importance => EnvironmentSampling::Importance,
+            EnvSampling::Uniform => EnvironmentSampling::Uniform,
+        },
+        ..PrepareOptions::default()
+    };
+    Ok(prepare::prepare(scene, &options)?)
+}
+
+/// Renders a scene. `progress` is called after every slice and may stop the run.
+///
+/// # Errors
+/// No usable device, a camera that does not exist, a scene that does not fit, a lost device.
+pub fn render(
+    scene: &Scene,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+) -> Result<RenderResult> {
+    let camera_index = choose_camera(scene, settings.camera.as_deref())?;
+    let camera =
+        scene.cameras.get(camera_index).ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)))?;
+    let open = open_device(settings)?;
+    tracing::info!("{}", open.reason);
+    let start = Instant::now();
+    let prepared = prepare_scene(scene, camera, settings)?;
+    let prepare_seconds = start.elapsed().as_secs_f64();
+    let mut tracer = PathTracer::new(&open.gpu, open.trace, &prepared, camera, settings, BindingOverride::default())?;
+    let run = tracer.run(settings.seed, settings.samples(), settings.time, progress)?;
+    let mut warnings = Vec::new();
+    if run.capped_samples > 0 {
+        warnings
+            .push(format!("{} samples had a path cut off at 65535 bounces: the image is too dark", run.capped_samples));
+    }
+    for place in &run.first_non_finite {
+        warnings.push(format!("pixel ({}, {}), sample {} is NaN or infinite", place.x, place.y, place.sample));
+    }
+    let aspect = f64::from(settings.width) / f64::from(settings.height);
+    let key = tracer.key();
+    Ok(RenderResult {
+        stopped_by: run.stopped_by,
+        device: open.gpu.info.name.clone(),
+        driver: open.gpu.info.driver.clone(),
+        device_reason: open.reason,
+        trace: open.trace.to_string(),
+        kernel_key: key.to_string(),
+        features: key.features.kept().into_iter().map(str::to_owned).collect(),
+        rays: run.rays,
+        paths: run.paths,
+        seconds: Seconds {
+            load: 0.0,
+            prepare: prepare_seconds,
+            compile: tracer.compile_seconds,
+            upload: tracer.upload_seconds,
+            render: run.seconds,
+            write: 0.0,
+        },
+        gpu_bytes: tracer.gpu_bytes(),
+        non_finite_samples: run.non_finite_samples,
+        first_non_finite: run.first_non_finite,
+        film: run.film,
+        world_to_camera: world_to_camera(camera.camera_to_world),
+        world_to_ndc: match camera.projection {
+            Projection::Perspective { yfov_radians } => {
+                world_to_ndc_perspective(camera.camera_to_world, yfov_radians, aspect)
+            }
+            Projection::Orthographic { ymag } => world_to_ndc_orthographic(camera.camera_to_world, ymag, aspect),
+        },
+        warnings,
+    })
+}

@@ -1,0 +1,331 @@
+//! The path-tracing kernel for one scene on one device: built once, run for any seed and range of samples.
+
+use std::ops::{ControlFlow, Range};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ash::vk::BufferUsageFlags as Usage;
+
+use super::kernel_key::KernelKey;
+use super::scene_buffers::{SceneBuffers, choose_array_form};
+use super::slices::{SLICES_IN_FLIGHT, Slice, SliceOutcome, SliceSizes};
+use super::{Integrator, NonFiniteSample, ProgressUpdate, Settings, StopReason};
+use crate::film::Film;
+use crate::gpu::{
+    ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
+    shader_compiler,
+};
+use crate::layout::{BLOCK_SAMPLES, BlockResult, RenderConstants, SliceConstants};
+use crate::prepare::{Prepared, camera_constants};
+use crate::scene::Camera;
+use crate::{Error, Result};
+
+/// How a [`PathTracer`] is bound, where the device's own choice is not wanted (tests try every form).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BindingOverride {
+    /// Form and log2 of the texels of a chunk.
+    pub array_form: Option<(ArrayForm, u32)>,
+    /// Lanes of a workgroup.
+    pub workgroup_size: Option<u32>,
+    /// Lanes of every slice.
+    pub slice_lanes: Option<u32>,
+    /// Rays a lane may trace in one dispatch.
+    pub ray_budget: Option<u32>,
+}
+
+/// A scene on a device, ready to be rendered.
+pub struct PathTracer {
+    gpu: Arc<Gpu>,
+    key: KernelKey,
+    kernel: Kernel,
+    constants: RenderConstants,
+    constants_buffer: Buffer,
+    slices: Vec<Slice>,
+    buffers: SceneBuffers,
+    overrides: BindingOverride,
+    /// Seconds that compiling and uploading took.
+    pub compile_seconds: f64,
+    /// See `compile_seconds`.
+    pub upload_seconds: f64,
+}
+
+/// What a run of the kernel returns.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The samples.
+    pub film: Film,
+    /// Which rule ended it.
+    pub stopped_by: StopReason,
+    /// Rays traced.
+    pub rays: u64,
+    /// Paths traced.
+    pub paths: u64,
+    /// Samples that were NaN or infinite.
+    pub non_finite_samples: u64,
+    /// The first few of them.
+    pub first_non_finite: Vec<NonFiniteSample>,
+    /// Samples with a path that the cap on bounces cut off.
+    pub capped_samples: u64,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+/// Non-finite samples whose place is kept.
+const REPORTED_NON_FINITE: usize = 16;
+
+impl PathTracer {
+    /// Uploads the scene and compiles its kernel.
+    ///
+    /// # Errors
+    /// Out of memory, a shader that does not compile, a limit of the device that the scene does not fit.
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        trace: TraceBackend,
+        prepared: &Prepared,
+        camera: &Camera,
+        settings: &Settings,
+        overrides: BindingOverride,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let lengths: Vec<usize> = prepared.arrays.iter().map(Vec::len).collect();
+        let form = match overrides.array_form {
+            Some(form) => form,
+            None => choose_array_form(&gpu.info, &lengths)?,
+        };
+        let buffers = SceneBuffers::upload(gpu, prepared, trace, form)?;
+        let mut constants = prepared.constants;
+        camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
+        constants.max_bounces = effective_max_bounces(settings);
+        let constants_buffer = Buffer::new(
+            gpu,
+            "render constants",
+            size_of::<RenderConstants>() as u64,
+            Usage::UNIFORM_BUFFER,
+            MemoryUse::Upload,
+        )?;
+        let slice_lanes = overrides.slice_lanes.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
+        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes)).collect();
+        let slices = slices?;
+        let upload_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let key = KernelKey::new(prepared, camera, settings, trace, form);
+        let kernel = build_kernel(gpu, &key, settings, overrides, &buffers, &constants_buffer, &slices)?;
+        let compile_seconds = start.elapsed().as_secs_f64();
+        Ok(Self {
+            gpu: gpu.clone(),
+            key,
+            kernel,
+            constants,
+            constants_buffer,
+            slices,
+            buffers,
+            overrides,
+            compile_seconds,
+            upload_seconds,
+        })
+    }
+
+    /// What the kernel was built with.
+    pub fn key(&self) -> &KernelKey {
+        &self.key
+    }
+
+    /// Bytes of device memory in use.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.buffers.bytes + self.slices.iter().map(Slice::bytes).sum::<u64>() + self.constants_buffer.size
+    }
+
+    /// Renders a range of sample indices of every pixel.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn run(
+        &mut self,
+        seed: u32,
+        samples: Range<u32>,
+        time: Option<Duration>,
+        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+    ) -> Result<Run> {
+        self.constants.seed = seed;
+        self.constants.first_sample = samples.start;
+        self.constants.end_sample = samples.end;
+        self.constants_buffer.write(&[self.constants])?;
+        let pixels = padded_pixels(&self.constants);
+        let blocks = samples.start / BLOCK_SAMPLES..samples.end.div_ceil(BLOCK_SAMPLES);
+        let mut queue = SliceSizes::new(self.overrides, self.slices[0].lanes());
+        let mut run = Run::new(&self.constants);
+        let start = Instant::now();
+        let total_atoms = pixels * u64::from(blocks.end - blocks.start);
+        let total_samples =
+            u64::from(samples.end - samples.start) * u64::from(self.constants.width) * u64::from(self.constants.height);
+        let mut next_atom = 0;
+        let mut in_flight = std::collections::VecDeque::new();
+        let mut free: Vec<usize> = (0..self.slices.len()).collect();
+        loop {
+            let timed_out = time.is_some_and(|limit| start.elapsed() >= limit);
+            if timed_out && next_atom < total_atoms {
+                run.stopped_by = StopReason::Time;
+            }
+            while run.stopped_by == StopReason::Samples && next_atom < total_atoms {
+                let Some(slot) = free.pop() else { break };
+                let lanes = queue.next_lanes().min(u32::try_from(total_atoms - next_atom).unwrap_or(u32::MAX));
+                let constants = SliceConstants {
+                    first_atom: u32::try_from(next_atom % pixels).unwrap_or(u32::MAX),
+                    lanes,
+                    first_block: blocks.start + u32::try_from(next_atom / pixels).unwrap_or(u32::MAX),
+                    ray_budget: queue.ray_budget(),
+                    ..SliceConstants::default()
+                };
+                self.slices[slot].submit(&self.kernel, slot, constants)?;
+                in_flight.push_back(slot);
+                next_atom += u64::from(lanes);
+            }
+            let Some(slot) = in_flight.pop_front() else { break };
+            let outcome = self.slices[slot].finish(&self.kernel, slot)?;
+            queue.observe(&outcome);
+            run.add(&self.constants, &outcome, self.slices[slot].results(outcome.constants.lanes)?);
+            free.push(slot);
+            let update = ProgressUpdate {
+                samples_done: run.paths,
+                samples_total: (total_samples < u64::from(u32::MAX) << 8 || time.is_none()).then_some(total_samples),
+                elapsed: start.elapsed(),
+                time_limit: time,
+            };
+            if progress(&update).is_break() && run.stopped_by == StopReason::Samples {
+                run.stopped_by = StopReason::Interrupted;
+            }
+        }
+        run.seconds = start.elapsed().as_secs_f64();
+        Ok(run)
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+}
+
+impl Run {
+    fn new(constants: &RenderConstants) -> Self {
+        Self {
+            film: Film::new(constants.width, constants.height),
+            stopped_by: StopReason::Samples,
+            rays: 0,
+            paths: 0,
+            non_finite_samples: 0,
+            first_non_finite: Vec::new(),
+            capped_samples: 0,
+            seconds: 0.0,
+        }
+    }
+
+    fn add(&mut self, constants: &RenderConstants, outcome: &SliceOutcome, results: &[BlockResult]) {
+        let pixels = padded_pixels(constants);
+        for (result, lane) in results.iter().zip(0_u64..) {
+            if result.samples == 0 {
+                continue;
+            }
+            let atom = u64::from(outcome.constants.first_atom) + lane;
+            let (x, y) = pixel_of_index(constants, atom % pixels);
+            let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
+            let pixel = y as usize * constants.width as usize + x as usize;
+            self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples);
+            self.rays += u64::from(result.rays);
+            self.paths += u64::from(result.samples);
+            self.capped_samples += u64::from(result.capped.count_ones());
+            self.non_finite_samples += u64::from(result.non_finite.count_ones());
+            let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
+            for bit in (0..BLOCK_SAMPLES).filter(|bit| result.non_finite >> bit & 1 == 1) {
+                if self.first_non_finite.len() < REPORTED_NON_FINITE {
+                    self.first_non_finite.push(NonFiniteSample { x, y, sample: block * BLOCK_SAMPLES + bit });
+                }
+            }
+        }
+    }
+}
+
+/// The low part of the sum; meaningless (NaN) where the sum itself is not finite.
+fn compensation(result: &BlockResult, channel: usize) -> f64 {
+    if result.sum[channel].is_finite() { f64::from(result.compensation[channel]) } else { 0.0 }
+}
+
+/// An integrator that adds nothing behind the first scattering events need not look there.
+fn effective_max_bounces(settings: &Settings) -> u32 {
+    let needed = match settings.integrator {
+        Integrator::Emission => 0,
+        Integrator::Direct => 1,
+        Integrator::Path | Integrator::Indirect => u32::MAX,
+    };
+    settings.max_bounces.unwrap_or(u32::MAX).min(needed)
+}
+
+/// Pixels of the film rounded up to whole 8×8 tiles.
+fn padded_pixels(constants: &RenderConstants) -> u64 {
+    u64::from(constants.width.div_ceil(8)) * u64::from(constants.height.div_ceil(8)) * 64
+}
+
+/// The pixel of an index, as `pixel_of_index` in shaders/include/lane.glsl.
+fn pixel_of_index(constants: &RenderConstants, index: u64) -> (u32, u32) {
+    let tiles_across = u64::from(constants.width.div_ceil(8));
+    let (tile, inside) = (index / 64, index % 64);
+    let x = tile % tiles_across * 8 + inside % 8;
+    let y = tile / tiles_across * 8 + inside / 8;
+    (u32::try_from(x).unwrap_or(u32::MAX), u32::try_from(y).unwrap_or(u32::MAX))
+}
+
+fn build_kernel(
+    gpu: &Arc<Gpu>,
+    key: &KernelKey,
+    settings: &Settings,
+    overrides: BindingOverride,
+    buffers: &SceneBuffers,
+    constants: &Buffer,
+    slices: &[Slice],
+) -> Result<Kernel> {
+    let spirv = kernel_spirv(key, settings)?;
+    let arrays = buffers.bindings();
+    let array_binding = match (key.array_form, &buffers.addresses) {
+        (ArrayForm::TexelBuffer, _) => BindingResource::TexelArray(&arrays),
+        (ArrayForm::DeviceAddress, Some(addresses)) => BindingResource::Uniform(addresses),
+        _ => BindingResource::StorageArray(&arrays),
+    };
+    let sets: Vec<Vec<BindingResource<'_>>> = slices
+        .iter()
+        .map(|slice| {
+            let mut set = vec![
+                BindingResource::Uniform(constants),
+                BindingResource::Storage(&slice.results),
+                BindingResource::Storage(&slice.lane_states),
+                array_binding,
+            ];
+            set.extend(buffers.acceleration.as_ref().map(BindingResource::AccelerationStructure));
+            set
+        })
+        .collect();
+    let sets: Vec<&[BindingResource<'_>]> = sets.iter().map(Vec::as_slice).collect();
+    let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
+    Ok(Kernel::new(
+        gpu,
+        &KernelDescription {
+            name: "path_trace",
+            spirv: &spirv,
+            workgroup_size,
+            constants: &key.specialization(),
+            push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
+            sets: &sets,
+        },
+    )?)
+}
+
+/// The embedded variant, or one compiled from `--shaders`.
+fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
+    let Some(folder) = &settings.shaders_dir else {
+        let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
+        return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
+    };
+    let sources = shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
+    let defines =
+        [("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
+    shader_compiler::compile(&sources, "path_trace.comp", &defines, true)
+        .map_err(|e| Error::input(folder, e.to_string()))
+}

@@ -1,0 +1,152 @@
+//! The prepared scene on the device: its arrays, in the form and the chunks that the device's limits ask for, and its
+//! acceleration structures where rays are traced by hardware.
+
+use std::sync::Arc;
+
+use ash::vk::BufferUsageFlags as Usage;
+
+use crate::gpu::{
+    AccelerationStructures, ArrayForm, Buffer, DeviceInfo, DeviceKind, Gpu, GpuError, GpuResult, InstanceGeometry,
+    MeshGeometry, TraceBackend,
+};
+use crate::layout::{MAX_CHUNKS, SCENE_ARRAYS, SceneArray, Texel};
+use crate::prepare::Prepared;
+
+/// Custom index of the baked mesh, as in shaders/include/trace_ray_query.glsl.
+const BAKED_INSTANCE: u32 = 0xff_ffff;
+/// An array that is not split.
+const WHOLE: u32 = 31;
+
+/// How arrays of the given sizes (in texels) are bound on a device: the form, and log2 of a chunk's texels.
+///
+/// Software drivers load from texel buffers cheapest; a GPU reads storage buffers. Device addresses have no limit and
+/// serve where the others cannot hold the arrays.
+///
+/// # Errors
+/// [`GpuError::Lacks`] if no form can hold them.
+pub fn choose_array_form(info: &DeviceInfo, lengths: &[usize]) -> GpuResult<(ArrayForm, u32)> {
+    let longest = lengths.iter().copied().max().unwrap_or(0) as u64;
+    let shift = |limit: u64| {
+        if longest <= limit {
+            return Some(WHOLE);
+        }
+        let shift = limit.checked_ilog2()?;
+        (longest <= (MAX_CHUNKS as u64) << shift).then_some(shift)
+    };
+    let allocation_texels = info.limits.allocation_size / 16;
+    let texel = shift(info.limits.texel_buffer_elements.min(allocation_texels));
+    let storage = shift((info.limits.storage_buffer_range / 16).min(allocation_texels));
+    let has_bindings = info.limits.stage_storage_buffers as usize >= SCENE_ARRAYS * MAX_CHUNKS + 2;
+    let storage = storage.filter(|_| has_bindings).map(|s| (ArrayForm::StorageBuffer, s));
+    let texel = texel.map(|s| (ArrayForm::TexelBuffer, s));
+    let address = info.buffer_device_address.then_some((ArrayForm::DeviceAddress, WHOLE));
+    let whole = |choice: Option<(ArrayForm, u32)>| choice.filter(|&(_, s)| s == WHOLE);
+    // Unsplit first.
+    let order = if info.kind == DeviceKind::Cpu {
+        [whole(texel), whole(storage), texel, storage, address]
+    } else {
+        [whole(storage), address, storage, whole(texel), texel]
+    };
+    order.into_iter().flatten().next().ok_or_else(|| GpuError::Lacks {
+        device: info.name.clone(),
+        lacks: format!("cannot bind an array of {} MiB in {MAX_CHUNKS} parts", longest / 65_536),
+    })
+}
+
+/// The scene's buffers.
+pub(super) struct SceneBuffers {
+    /// `MAX_CHUNKS` bindings an array; an absent chunk is an empty buffer.
+    chunks: Vec<Vec<Buffer>>,
+    empty: Buffer,
+    /// Addresses of the arrays (uniform buffer), for [`ArrayForm::DeviceAddress`].
+    pub(super) addresses: Option<Buffer>,
+    pub(super) acceleration: Option<AccelerationStructures>,
+    /// Bytes in all.
+    pub(super) bytes: u64,
+}
+
+impl SceneBuffers {
+    pub(super) fn upload(
+        gpu: &Arc<Gpu>,
+        prepared: &Prepared,
+        trace: TraceBackend,
+        (form, chunk_shift): (ArrayForm, u32),
+    ) -> GpuResult<Self> {
+        let usage = match form {
+            ArrayForm::TexelBuffer => Usage::UNIFORM_TEXEL_BUFFER,
+            ArrayForm::StorageBuffer => Usage::STORAGE_BUFFER,
+            ArrayForm::DeviceAddress => Usage::STORAGE_BUFFER | Usage::SHADER_DEVICE_ADDRESS,
+        };
+        let empty = Buffer::with_data(gpu, "no chunk", &[[0_u32; 4]], usage)?;
+        let mut chunks = Vec::new();
+        for (array, name) in prepared.arrays.iter().zip(["slots", "attributes", "tables", "texels", "environment"]) {
+            let chunk_texels = if chunk_shift == WHOLE { array.len().max(1) } else { 1 << chunk_shift };
+            let buffers: GpuResult<Vec<_>> =
+                array.chunks(chunk_texels).map(|chunk| Buffer::with_data(gpu, name, chunk, usage)).collect();
+            chunks.push(buffers?);
+        }
+        let addresses = (form == ArrayForm::DeviceAddress).then(|| upload_addresses(gpu, &chunks)).transpose()?;
+        let acceleration = (trace == TraceBackend::RayQuery).then(|| build_acceleration(gpu, prepared)).transpose()?;
+        let bytes = chunks.iter().flatten().map(|b| b.size).sum::<u64>()
+            + acceleration.as_ref().map_or(0, AccelerationStructures::bytes);
+        Ok(Self { chunks, empty, addresses, acceleration, bytes })
+    }
+
+    /// The bindings of `scene_arrays`.
+    pub(super) fn bindings(&self) -> Vec<&Buffer> {
+        self.chunks
+            .iter()
+            .flat_map(|array| (0..MAX_CHUNKS).map(move |i| array.get(i)))
+            .map(|chunk| chunk.unwrap_or(&self.empty))
+            .collect()
+    }
+}
+
+fn upload_addresses(gpu: &Arc<Gpu>, chunks: &[Vec<Buffer>]) -> GpuResult<Buffer> {
+    let mut words = vec![[0_u32; 4]; SCENE_ARRAYS * MAX_CHUNKS];
+    for (array, buffers) in chunks.iter().enumerate() {
+        for (chunk, buffer) in buffers.iter().enumerate() {
+            let address = buffer.device_address();
+            words[array * MAX_CHUNKS + chunk] = [(address & 0xffff_ffff) as u32, (address >> 32) as u32, 0, 0];
+        }
+    }
+    Buffer::with_data(gpu, "array addresses", &words, Usage::UNIFORM_BUFFER)
+}
+
+/// Every mesh over all of its slots, so that primitive i is slot first + i; slots that are no triangles become degenerate
+/// ones.
+fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<AccelerationStructures> {
+    let slots = &prepared.arrays[SceneArray::Slots as usize];
+    let mut geometry = Vec::new();
+    for mesh in &prepared.meshes {
+        let texels: &[Texel] = &slots[3 * mesh.slots.start as usize..3 * mesh.slots.end as usize];
+        let words: &[u32] = bytemuck::cast_slice(texels);
+        let vertices: Vec<[f32; 3]> = words.chunks_exact(3).map(|v| [v[0], v[1], v[2]].map(f32::from_bits)).collect();
+        let mut indices = vec![[0_u32; 3]; texels.len() / 3];
+        for slot in prepared.triangle_slots(mesh) {
+            let i = slot - mesh.slots.start;
+            indices[i as usize] = [4 * i, 4 * i + 1, 4 * i + 2];
+        }
+        geometry.push((keep_finite(vertices, &indices), indices));
+    }
+    let meshes: Vec<_> = geometry.iter().map(|(vertices, indices)| MeshGeometry { vertices, indices }).collect();
+    let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+    let mut instances = vec![InstanceGeometry { mesh: 0, transform: identity, custom_index: BAKED_INSTANCE }];
+    instances.extend(prepared.instances.iter().zip(0..).map(|(instance, custom_index)| InstanceGeometry {
+        mesh: instance.mesh,
+        transform: instance.record.object_to_world,
+        custom_index,
+    }));
+    AccelerationStructures::build(gpu, &meshes, &instances)
+}
+
+/// Words of inner slots read as floats can be NaN; only triangles' vertices matter.
+fn keep_finite(mut vertices: Vec<[f32; 3]>, indices: &[[u32; 3]]) -> Vec<[f32; 3]> {
+    for (quad, triangle) in vertices.chunks_exact_mut(4).zip(indices) {
+        if *triangle == [0; 3] {
+            quad.fill([0.0; 3]);
+        }
+        quad[3] = [0.0; 3];
+    }
+    vertices
+}

@@ -1,0 +1,296 @@
+//! What a render is asked to do, as plain data with defaults.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use crate::film::Film;
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// Settings of a render.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Width of the image in pixels, ≥ 1.
+    pub width: u32,
+    /// Height of the image in pixels, ≥ 1.
+    pub height: u32,
+    /// Samples per pixel, ≥ 1; `u32::MAX` if only `time` ends the run.
+    pub spp: u32,
+    /// Wall time for rendering, after which the run ends.
+    pub time: Option<Duration>,
+    /// Only these sample indices, instead of `0..spp`.
+    pub sample_range: Option<Range<u32>>,
+    /// Seed of the sampler.
+    pub seed: u32,
+    /// Scattering events a path may have: 0 shows emitters alone, 1 adds direct light. `None` is unlimited.
+    pub max_bounces: Option<u32>,
+    /// Which part of the light is added up.
+    pub integrator: Integrator,
+    /// Where the random numbers come from.
+    pub sampler: SamplerKind,
+    /// How light is looked for.
+    pub light_sampling: LightSampling,
+    /// How [`LightSampling::Mis`] weighs its two samples.
+    pub mis_heuristic: MisHeuristic,
+    /// How directions to an image environment are chosen.
+    pub env_sampling: EnvSampling,
+    /// The pixel filter.
+    pub filter: PixelFilter,
+    /// Which implementation traces rays.
+    pub trace: TraceChoice,
+    /// Which device renders.
+    pub device: DeviceChoice,
+    /// A folder whose shader sources replace the embedded ones.
+    pub shaders_dir: Option<PathBuf>,
+    /// A camera of the scene by name or index; `None` is the first.
+    pub camera: Option<String>,
+    /// Refuse to succeed with a result that is not trustworthy.
+    pub strict: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            spp: 128,
+            time: None,
+            sample_range: None,
+            seed: 0,
+            max_bounces: None,
+            integrator: Integrator::default(),
+            sampler: SamplerKind::default(),
+            light_sampling: LightSampling::default(),
+            mis_heuristic: MisHeuristic::default(),
+            env_sampling: EnvSampling::default(),
+            filter: PixelFilter::default(),
+            trace: TraceChoice::default(),
+            device: DeviceChoice::default(),
+            shaders_dir: None,
+            camera: None,
+            strict: false,
+        }
+    }
+}
+
+impl Settings {
+    /// The sample indices to render.
+    pub fn samples(&self) -> Range<u32> {
+        self.sample_range.clone().unwrap_or(0..self.spp)
+    }
+
+    /// The sample indices that a film rendered with these settings holds: a run that ended early has the first ones,
+    /// and its pixels may differ in how many.
+    pub fn samples_in(&self, film: &Film) -> Range<u32> {
+        let asked = self.samples();
+        let most = film.pixels().iter().map(|pixel| pixel.count).max().unwrap_or(0);
+        asked.start..asked.start.saturating_add(most).min(asked.end)
+    }
+}
+
+/// An enum whose values have names on the command line: `ALL`, `name()`, `Display` and `FromStr`.
+macro_rules! named_enum {
+    ($(#[$doc:meta])* $name:ident, $what:literal { $($(#[$variant_doc:meta])* $variant:ident = $text:literal,)+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub enum $name { $($(#[$variant_doc])* $variant,)+ }
+
+        impl $name {
+            /// Every value, in the order of the documentation.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+            /// The names of all values.
+            pub const NAMES: &[&str] = &[$($text),+];
+
+            /// The name on the command line.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $text),+ }
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = String;
+
+            fn from_str(name: &str) -> std::result::Result<Self, String> {
+                Self::ALL.iter().copied().find(|value| value.name() == name).ok_or_else(|| {
+                    format!(concat!("unknown ", $what, " '{}'; there are {}"), name, Self::NAMES.join(", "))
+                })
+            }
+        }
+    };
+}
+
+named_enum! {
+    /// Which part of the light is added up. Emission + direct + indirect = path, to 1 ulp at the same seed.
+    Integrator, "integrator" {
+        /// All light.
+        #[default]
+        Path = "path",
+        /// Exactly one scattering event.
+        Direct = "direct",
+        /// Two scattering events or more.
+        Indirect = "indirect",
+        /// None: emitters and the environment as the camera sees them.
+        Emission = "emission",
+    }
+}
+
+named_enum! {
+    /// How light is looked for. Lights that only one strategy can see are seen in every mode that has it.
+    LightSampling, "light sampling" {
+        /// A light sample and a BSDF sample at each vertex, weighted by multiple importance sampling.
+        #[default]
+        Mis = "mis",
+        /// One sample at each vertex, of the light or of the BSDF, divided by the averaged density.
+        Mixture = "mixture",
+        /// Light samples only (next event estimation).
+        Nee = "nee",
+        /// BSDF samples only.
+        Bsdf = "bsdf",
+    }
+}
+
+named_enum! {
+    /// How multiple importance sampling weighs (Veach 1997, section 9.2).
+    MisHeuristic, "MIS heuristic" {
+        /// p / Σ p.
+        Balance = "balance",
+        /// p² / Σ p².
+        #[default]
+        Power = "power",
+    }
+}
+
+named_enum! {
+    /// How directions to an image environment are chosen.
+    EnvSampling, "environment sampling" {
+        /// In proportion to its luminance.
+        #[default]
+        Importance = "importance",
+        /// Evenly over the sphere.
+        Uniform = "uniform",
+    }
+}
+
+named_enum! {
+    /// Where the random numbers come from.
+    SamplerKind, "sampler" {
+        /// Independent uniform numbers, hashed from pixel, sample and dimension.
+        #[default]
+        Independent = "independent",
+        /// Owen-scrambled Sobol' points.
+        Sobol = "sobol",
+    }
+}
+
+named_enum! {
+    /// The pixel filter, sampled by importance.
+    PixelFilter, "filter" {
+        /// One pixel, evenly.
+        #[default]
+        Box = "box",
+        /// Two pixels wide, a triangle.
+        Tent = "tent",
+        /// Truncated Gaussian.
+        Gaussian = "gaussian",
+        /// Blackman-Harris window.
+        BlackmanHarris = "blackman-harris",
+    }
+}
+
+named_enum! {
+    /// Which implementation traces rays.
+    TraceChoice, "trace back end" {
+        /// Ray queries where the device has them.
+        #[default]
+        Auto = "auto",
+        /// `VK_KHR_ray_query`.
+        RayQuery = "ray-query",
+        /// The shader's own BVH.
+        Bvh = "bvh",
+    }
+}
+
+/// Which device renders.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// The best: discrete, integrated, virtual, then CPU.
+    #[default]
+    Auto,
+    /// All of them together.
+    All,
+    /// By its number in `sunfleck devices`.
+    Index(usize),
+    /// By a part of its name, upper or lower case.
+    Name(String),
+}
+
+impl FromStr for DeviceChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            "all" => Self::All,
+            _ => text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index),
+        })
+    }
+}
+
+impl fmt::Display for DeviceChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::All => f.write_str("all"),
+            Self::Index(index) => write!(f, "{index}"),
+            Self::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+/// The index of the camera that `choice` names: a name, else an index, else (without a choice) the first.
+///
+/// # Errors
+/// [`Error::Usage`] that lists the scene's cameras.
+pub fn choose_camera(scene: &Scene, choice: Option<&str>) -> Result<usize> {
+    let Some(wanted) = choice else { return Ok(0) };
+    let by_name = scene.cameras.iter().position(|camera| camera.name == wanted);
+    let by_index = wanted.parse().ok().filter(|&index: &usize| index < scene.cameras.len());
+    by_name.or(by_index).ok_or_else(|| {
+        let list: Vec<_> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} '{}'", c.name)).collect();
+        Error::Usage(format!("--camera: no camera '{wanted}' in {}; there are: {}", scene.name, list.join(", ")))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back() {
+        for integrator in Integrator::ALL {
+            assert_eq!(integrator.to_string().parse(), Ok(*integrator));
+        }
+        let error = "rtx".parse::<TraceChoice>().unwrap_err();
+        assert_eq!(error, "unknown trace back end 'rtx'; there are auto, ray-query, bvh");
+        assert_eq!("2".parse(), Ok(DeviceChoice::Index(2)));
+        assert_eq!("H200".parse(), Ok(DeviceChoice::Name("H200".to_owned())));
+    }
+
+    #[test]
+    fn a_run_that_ended_early_holds_the_first_samples() {
+        let settings = Settings { sample_range: Some(64..128), ..Settings::default() };
+        let mut film = Film::new(1, 2);
+        assert_eq!(settings.samples_in(&film), 64..64);
+        film.add_block(1, [0.0; 3], 0.0, 16);
+        assert_eq!(settings.samples_in(&film), 64..80);
+    }
+}

@@ -1,0 +1,203 @@
+//! Materials.
+//!
+//! glTF's metallic-roughness model, or one of the classic BSDFs by the extras
+//! `{"sunfleck": {"bsdf": "lambertian" | "mirror" | "refract" | "glass", "fresnel": "exact" | "schlick",
+//! "black_back": true | false}}`; their colour is the base colour, their index of refraction KHR_materials_ior's.
+
+use super::Loader;
+use super::json::Json;
+use crate::scene::{Bsdf, Fresnel, Material, SceneResult, TextureBinding};
+
+impl Loader<'_> {
+    /// The index in `Scene::materials` of a glTF material, or of the default one. Where a primitive has no texture
+    /// coordinates, textures cannot be used and the factors stand alone.
+    pub(super) fn material(&mut self, place: Option<(usize, Json<'_>)>, has_texcoords: bool) -> SceneResult<usize> {
+        let key = (place.as_ref().map(|(index, _)| *index), has_texcoords || place.is_none());
+        if let Some(&known) = self.materials.get(&key) {
+            return Ok(known);
+        }
+        let material = match &place {
+            Some((_, place)) => self.read_material(place, has_texcoords)?,
+            None => Material { name: String::from("default"), ..Material::default() },
+        };
+        self.scene.materials.push(material);
+        let index = self.scene.materials.len() - 1;
+        self.materials.insert(key, index);
+        Ok(index)
+    }
+
+    /// Whether a material of the scene reads any texture.
+    pub(super) fn is_textured(&self, material: usize) -> bool {
+        let material = &self.scene.materials[material];
+        material.base_color_texture.is_some()
+            || material.metallic_roughness_texture.is_some()
+            || material.emission_texture.is_some()
+    }
+
+    fn read_material(&mut self, place: &Json<'_>, has_texcoords: bool) -> SceneResult<Material> {
+        let mut material = Material {
+            name: place.name(),
+            double_sided: place.flag("doubleSided")?,
+            ior: self.index_of_refraction(place)?,
+            ..Material::default()
+        };
+        if let Some(unlit) = place.extension("KHR_materials_unlit")? {
+            let _ = unlit.keys()?;
+            material.bsdf = Bsdf::Unlit;
+        }
+        read_extras(place, &mut material)?;
+        if let Some(pbr) = place.get("pbrMetallicRoughness")? {
+            self.read_metallic_roughness(&pbr, &mut material, has_texcoords)?;
+        }
+        if material.bsdf != Bsdf::Unlit {
+            self.read_emission(place, &mut material, has_texcoords)?;
+        }
+        if material.bsdf == Bsdf::MetallicRoughness {
+            self.read_transmission(place, &mut material)?;
+        }
+        self.warn_of_material(place, &material)?;
+        Ok(material)
+    }
+
+    fn read_metallic_roughness(
+        &mut self,
+        pbr: &Json<'_>,
+        material: &mut Material,
+        has_texcoords: bool,
+    ) -> SceneResult<()> {
+        if let Some(place) = pbr.get("baseColorFactor")? {
+            for component in place.elements()? {
+                component.number_within(0.0, 1.0)?;
+            }
+            let [r, g, b, _] = place.numbers::<4>()?;
+            material.base_color = [r, g, b].map(|c| c as f32);
+        }
+        if material.base_color != [0.0; 3] {
+            material.base_color_texture = self.texture(pbr.get("baseColorTexture")?, has_texcoords)?;
+        }
+        if material.bsdf == Bsdf::MetallicRoughness {
+            material.metallic = pbr.number_in("metallicFactor", 1.0, 0.0, 1.0)? as f32;
+            material.roughness = pbr.number_in("roughnessFactor", 1.0, 0.0, 1.0)? as f32;
+            if material.metallic > 0.0 || material.roughness > 0.0 {
+                material.metallic_roughness_texture =
+                    self.texture(pbr.get("metallicRoughnessTexture")?, has_texcoords)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_emission(&mut self, place: &Json<'_>, material: &mut Material, has_texcoords: bool) -> SceneResult<()> {
+        let factor = place.color("emissiveFactor", [0.0; 3], f64::MAX)?;
+        let strength = match place.extension("KHR_materials_emissive_strength")? {
+            Some(extension) => extension.number_in("emissiveStrength", 1.0, 0.0, f64::MAX)?,
+            None => 1.0,
+        };
+        material.emission = factor.map(|f| (f * strength) as f32);
+        if !material.emission.iter().all(|e| e.is_finite()) {
+            return Err(place.fail("the emission (emissiveFactor times strength) is too large for a 32-bit float"));
+        }
+        if material.is_emissive() {
+            material.emission_texture = self.texture(place.get("emissiveTexture")?, has_texcoords)?;
+        }
+        Ok(())
+    }
+
+    fn index_of_refraction(&mut self, place: &Json<'_>) -> SceneResult<f32> {
+        let Some(extension) = place.extension("KHR_materials_ior")? else { return Ok(1.5) };
+        let ior = extension.number_in("ior", 1.5, 0.0, f64::from(f32::MAX))? as f32;
+        if ior > 0.0 {
+            return Ok(ior);
+        }
+        // KHR_materials_ior gives 0 a meaning of its own: full reflection, for converted specular-glossiness materials.
+        self.warnings.add("an index of refraction of 0 is not supported yet: 1.5 is used", &extension.pointer);
+        Ok(1.5)
+    }
+
+    /// KHR_materials_transmission is thin-walled; only a volume would make it solid.
+    fn read_transmission(&mut self, place: &Json<'_>, material: &mut Material) -> SceneResult<()> {
+        let Some(extension) = place.extension("KHR_materials_transmission")? else { return Ok(()) };
+        material.transmission = extension.number_in("transmissionFactor", 0.0, 0.0, 1.0)? as f32;
+        if extension.get("transmissionTexture")?.is_some() && material.transmission > 0.0 {
+            let subject = "transmission textures are not supported yet: the factor alone is used";
+            self.warnings.add(subject, &extension.pointer);
+        }
+        if material.transmission > 0.0 && place.extension("KHR_materials_volume")?.is_some() {
+            let subject =
+                "KHR_materials_volume is not supported yet: transmission stays thin-walled, without refraction";
+            self.warnings.add(subject, &place.pointer);
+        }
+        Ok(())
+    }
+
+    /// Names the features of a material that are not covered. Occlusion textures are no part of a path tracer.
+    fn warn_of_material(&mut self, place: &Json<'_>, material: &Material) -> SceneResult<()> {
+        if material.bsdf != Bsdf::Unlit && place.get("normalTexture")?.is_some() {
+            let subject = "normal textures are not supported yet: the interpolated normal is used";
+            self.warnings.add(subject, &place.pointer);
+        }
+        let alpha_mode = place.get("alphaMode")?.map_or(Ok("OPAQUE"), |mode| mode.string())?;
+        if alpha_mode != "OPAQUE" {
+            let subject = format!("alphaMode {alpha_mode} is not supported yet: the surface is opaque");
+            self.warnings.add(subject, &place.pointer);
+        }
+        let volume_was_named = self.warnings.has("KHR_materials_volume ");
+        for name in place.extension_names()? {
+            let known = super::SUPPORTED.contains(&name.as_str()) || super::INVISIBLE.contains(&name.as_str());
+            if !known && !(volume_was_named && name == "KHR_materials_volume") {
+                let subject = format!("{name} is not supported yet: what it describes is ignored");
+                self.warnings.add(subject, &place.pointer);
+            }
+        }
+        Ok(())
+    }
+
+    /// The binding of a texture info object; `None` if there is none or it cannot be honoured.
+    fn texture(&mut self, info: Option<Json<'_>>, has_texcoords: bool) -> SceneResult<Option<TextureBinding>> {
+        let Some(info) = info else { return Ok(None) };
+        if info.extension("KHR_texture_transform")?.is_some() {
+            let subject = "KHR_texture_transform is not supported yet: textures are shown untransformed";
+            self.warnings.add(subject, &info.pointer);
+        }
+        let (index, place) = info.require("index")?.refer("textures")?;
+        if info.unsigned_or("texCoord", 0)? != 0 {
+            let subject = "textures on TEXCOORD_1 and higher are not supported yet: their factor alone is used";
+            self.warnings.add(subject, &info.pointer);
+            return Ok(None);
+        }
+        if !has_texcoords {
+            let subject = "textures on meshes without TEXCOORD_0 cannot be shown: their factor alone is used";
+            self.warnings.add(subject, &info.pointer);
+            return Ok(None);
+        }
+        let texture = self.load_texture(index, &place)?;
+        Ok(Some(TextureBinding { texture }))
+    }
+}
+
+/// The material's `sunfleck` extras.
+fn read_extras(place: &Json<'_>, material: &mut Material) -> SceneResult<()> {
+    let Some(extras) = place.sunfleck_extras(&["bsdf", "fresnel", "black_back"])? else { return Ok(()) };
+    if let Some(bsdf) = extras.get("bsdf")? {
+        material.bsdf = match bsdf.string()? {
+            "lambertian" => Bsdf::Lambertian,
+            "mirror" => Bsdf::Mirror,
+            "refract" => Bsdf::Refract,
+            "glass" => Bsdf::Glass,
+            other => {
+                let error = bsdf.fail(format!("\"{other}\" is no BSDF"));
+                return Err(error.hint("use lambertian, mirror, refract or glass"));
+            }
+        };
+    }
+    if let Some(fresnel) = extras.get("fresnel")? {
+        material.fresnel = match fresnel.string()? {
+            "exact" => Fresnel::Exact,
+            "schlick" => Fresnel::Schlick,
+            other => {
+                return Err(fresnel.fail(format!("\"{other}\" is no Fresnel term")).hint("use exact or schlick"));
+            }
+        };
+    }
+    material.black_back = extras.flag("black_back")?;
+    Ok(())
+}
