@@ -10,9 +10,9 @@ runs=${SUNFLECK_DRIVERS:-"mesa-22 mesa-25-bvh mesa-25-ray-query swiftshader"}
 
 scripts/drivers.sh
 
-# A test file touches a device if it uses the GPU fixture or runs the program; the others need no repetition.
+# A test file touches a device if it uses the GPU fixture, renders or runs the program; the others need no repetition.
 if [ $# -eq 0 ]; then
-    for file in $(grep -lE 'common::gpu|cargo_bin|CARGO_BIN_EXE' tests/*.rs || true); do
+    for file in $(grep -lwE 'gpu|sunfleck::render|cargo_bin' tests/*.rs || true); do
         set -- "$@" --test "$(basename "$file" .rs)"
     done
 fi
