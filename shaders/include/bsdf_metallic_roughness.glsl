@@ -14,14 +14,17 @@ bool metallic_roughness_has_continuous_lobe(BsdfParameters p) {
     return p.alpha > 0.0 || p.metallic < 1.0;
 }
 
-// Probabilities of the lobes (specular, diffuse, through). The specular one has at least the mean of Schlick's term over
-// the hemisphere, F0 + (1 − F0)/21, so it is chosen wherever it is positive.
+// Probabilities of the lobes (specular, diffuse, through), by about what each sends on. The specular one has at least the
+// mean of Schlick's term over the hemisphere, F0 + (1 − F0)/21, so it is chosen wherever it is positive. The diffuse lobe's
+// factor 1 − F(wo·h) is replaced by its mean too: unlike that of the light straight through, it does not vanish with wo.y,
+// and a lobe chosen too seldom makes fireflies.
 vec3 lobe_probabilities(BsdfParameters p, float cosine) {
     vec3 f0 = specular_f0(p);
-    vec3 fresnel = max(fresnel_schlick(f0, cosine), f0 + (1.0 - f0) * (1.0 / 21.0));
-    float specular = luminance(fresnel);
-    float base = luminance(diffuse_color(p)) * (1.0 - luminance(fresnel_schlick(f0, cosine)));
-    vec3 weights = vec3(specular, base * (1.0 - p.transmission), base * p.transmission);
+    vec3 mean = f0 + (1.0 - f0) * (1.0 / 21.0);
+    vec3 fresnel = fresnel_schlick(f0, cosine);
+    float base = luminance(diffuse_color(p));
+    vec3 weights = vec3(luminance(max(fresnel, mean)), base * (1.0 - p.transmission) * (1.0 - luminance(mean)),
+                        base * p.transmission * (1.0 - luminance(fresnel)));
     return weights / (weights.x + weights.y + weights.z);
 }
 

@@ -6,6 +6,7 @@
 #include "features.glsl"
 #include "layout.glsl"
 #include "math.glsl"
+#include "rng.glsl"
 
 struct EnvironmentSample {
     vec3 direction;

@@ -18,18 +18,23 @@ struct SampleKey {
     uint seed;
 };
 
-// Jarzynski and Olano 2020, "Hash Functions for GPU Rendering": the four-dimensional PCG hash.
+void pcg_mix(inout uvec4 v) {
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+}
+
+// The four-dimensional PCG hash of Jarzynski and Olano 2020, "Hash Functions for GPU Rendering", with a third round: after
+// their two, keys that differ in the upper half of one word alone (the y of a pixel) still make the lower half of the
+// result repeat itself (tests/sampler.rs).
 uvec4 pcg4d(uvec4 v) {
     v = v * 1664525u + 1013904223u;
-    v.x += v.y * v.w;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    v.w += v.y * v.z;
+    pcg_mix(v);
     v ^= v >> 16u;
-    v.x += v.y * v.w;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    v.w += v.y * v.z;
+    pcg_mix(v);
+    v ^= v >> 16u;
+    pcg_mix(v);
     return v;
 }
 

@@ -2,6 +2,7 @@
 // images dynamically. Coordinates and filters follow glTF 2.0 (v = 0 is the top row, texel centres at (i + 0.5) / size).
 #ifndef TEXTURE_GLSL
 #define TEXTURE_GLSL
+#include "features.glsl"
 #include "records.glsl"
 
 // sRGB to linear for x in [0, 1] (IEC 61966-2-1). The power is evaluated as x² · x^0.4 with x^0.4 = exp2(0.4 · log2 x),

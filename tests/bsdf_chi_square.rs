@@ -1,0 +1,287 @@
+//! `bsdf_scatter` draws from the density that `bsdf_pdf` states: χ² tests of the shaders' own functions over a grid of
+//! parameters, with bins narrow enough for the narrowest lobe. Delta lobes and absorption are cells of their own.
+
+mod common;
+
+use common::bsdf::{
+    Configuration, HalfVectorBins, MetallicRoughness, Node, SCATTERED_THROUGH, Sample, Value, direction, evaluate,
+    luminance, scatter,
+};
+use common::kernel::TestKernel;
+use common::statistics::{ChiSquare, chi_square_test, sidak};
+use glam::DVec3;
+use sunfleck::layout::{BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS};
+
+/// Level of each test here, all of its configurations together.
+const ALPHA: f64 = 0.01;
+/// Samples of a configuration.
+const SAMPLES: usize = 1 << 14;
+/// Nodes along the polar angle in a bin.
+const ORDER: usize = 10;
+
+/// From the roughness at which the lobe becomes a delta (1/64: α = 2^-12) to 1.
+const ROUGHNESS: [f32; 7] = [0.0, 1.0 / 64.0, 0.06, 0.2, 0.45, 0.7, 1.0];
+const METALLIC: [f32; 3] = [0.0, 0.5, 1.0];
+const COSINES: [f64; 5] = [1.0, 0.8, 0.3, 0.05, 1e-3];
+const IORS: [f32; 4] = [1.0001, 1.5, 3.0, 0.7];
+
+/// Every roughness with every metalness and angle; indices and transmission take turns.
+fn configurations() -> Vec<Configuration> {
+    let mut all = Vec::new();
+    for (i, roughness) in ROUGHNESS.into_iter().enumerate() {
+        for (j, metallic) in METALLIC.into_iter().enumerate() {
+            for (k, cosine) in COSINES.into_iter().enumerate() {
+                // At grazing angles f32 directions do not resolve the narrowest lobes (`Configuration::rounding`).
+                if cosine < 0.01 && roughness > 0.0 && roughness < 0.1 {
+                    continue;
+                }
+                let n = i + 2 * j + 3 * k;
+                let transmission = if n % 3 == 0 { 0.6 } else { 0.0 };
+                let wo = direction(cosine, 0.7 + n as f64);
+                all.push(Configuration::metallic_roughness(roughness, metallic, IORS[n % 4], transmission, wo));
+            }
+        }
+    }
+    let lambertian = |cosine| Configuration::new(BSDF_LAMBERTIAN, [0.8, 0.5, 0.2], direction(cosine, 4.0));
+    all.extend([1.0, 0.4, 1e-6].map(lambertian));
+    all
+}
+
+fn bins(c: &Configuration) -> HalfVectorBins {
+    let alpha = if c.kind == BSDF_METALLIC_ROUGHNESS { f64::from(c.alpha) } else { 0.0 };
+    HalfVectorBins::new(alpha, c.wo)
+}
+
+/// The integral over each bin of what the shader says at its nodes.
+struct Integrals {
+    pdf: Vec<f64>,
+    /// ∫ f cos over all bins.
+    albedo: DVec3,
+}
+
+fn integrate(kernel: &TestKernel, configurations: &[Configuration]) -> Vec<Integrals> {
+    let nodes: Vec<Vec<Node>> = configurations.iter().map(|c| bins(c).nodes(ORDER)).collect();
+    let at: Vec<(usize, DVec3)> =
+        nodes.iter().enumerate().flat_map(|(i, nodes)| nodes.iter().map(move |node| (i, node.wi))).collect();
+    let values = evaluate(kernel, configurations, &at);
+    let mut rest = values.as_slice();
+    let integrals = |(c, nodes): (&Configuration, &Vec<Node>)| {
+        let (own, others) = rest.split_at(nodes.len());
+        rest = others;
+        let mut result = Integrals { pdf: vec![0.0; bins(c).len()], albedo: DVec3::ZERO };
+        for (node, value) in nodes.iter().zip(own) {
+            assert!(
+                value.pdf.is_finite() && value.pdf >= 0.0 && value.f.is_finite(),
+                "{c:?}: {value:?} at {}",
+                node.wi
+            );
+            result.pdf[node.bin] += value.pdf * node.weight;
+            result.albedo += value.f * (node.wi.y.max(0.0) * node.weight);
+        }
+        result
+    };
+    configurations.iter().zip(&nodes).map(integrals).collect()
+}
+
+/// Probabilities of the delta lobes: mirrored, straight through.
+fn delta_probabilities(c: &Configuration) -> [f64; 2] {
+    if c.kind != BSDF_METALLIC_ROUGHNESS {
+        return [0.0; 2];
+    }
+    let lobes = MetallicRoughness::new(c).lobes(c.wo.y);
+    [if c.alpha == 0.0 { lobes.x } else { 0.0 }, lobes.z]
+}
+
+/// Cells: the bins, then the two delta lobes; what is absorbed is in none.
+fn count(c: &Configuration, samples: &[Sample]) -> Vec<u64> {
+    let bins = bins(c);
+    let mut observed = vec![0; bins.len() + 2];
+    for sample in samples {
+        assert!(sample.weight.is_finite() && sample.pdf.is_finite() && sample.wi.is_finite(), "{c:?}: {sample:?}");
+        if sample.is_delta() {
+            observed[bins.len() + usize::from(sample.flags & SCATTERED_THROUGH != 0)] += 1;
+        } else if !sample.is_absorbed() {
+            observed[bins.bin(sample.wi)] += 1;
+        }
+    }
+    observed
+}
+
+/// The χ² test of every configuration.
+fn chi_square(sampled: &TestKernel, evaluated: &TestKernel, configurations: &[Configuration]) -> Vec<ChiSquare> {
+    let integrals = integrate(evaluated, configurations);
+    let samples = scatter(sampled, configurations, SAMPLES, 1);
+    let test = |((c, integrals), samples): ((&Configuration, &Integrals), &[Sample])| {
+        let mut probability = integrals.pdf.clone();
+        probability.extend(delta_probabilities(c));
+        let expected: Vec<f64> = probability.iter().map(|p| p * SAMPLES as f64).collect();
+        chi_square_test(&count(c, samples), &expected, SAMPLES as u64)
+    };
+    configurations.iter().zip(&integrals).zip(samples.chunks_exact(SAMPLES)).map(test).collect()
+}
+
+fn failures(configurations: &[Configuration], results: &[ChiSquare]) -> Vec<String> {
+    let threshold = sidak(ALPHA, results.len());
+    let failed = configurations.iter().zip(results).filter(|(_, result)| result.p_value < threshold);
+    failed.map(|(c, result)| format!("{c:?}: {result:?}")).collect()
+}
+
+fn scattering() -> TestKernel {
+    TestKernel::new("bsdf.comp")
+}
+
+fn evaluating() -> TestKernel {
+    TestKernel::new("bsdf.comp").define("EVALUATE", 1)
+}
+
+#[test]
+fn scattered_directions_follow_the_pdf() {
+    let configurations = configurations();
+    let failures = failures(&configurations, &chi_square(&scattering(), &evaluating(), &configurations));
+    assert!(failures.is_empty(), "{} fail:\n{}", failures.len(), failures.join("\n"));
+}
+
+/// Roughness whose α is 10 % off between sampling and density is noticed at every roughness that has a lobe.
+#[test]
+fn a_wrong_roughness_is_noticed() {
+    let wo = direction(0.6, 1.0);
+    let metal = |roughness| Configuration::metallic_roughness(roughness, 1.0, 1.5, 0.0, wo);
+    let configurations: Vec<Configuration> = ROUGHNESS[2..].iter().map(|r| metal(*r)).collect();
+    let faulty = scattering().define("ALPHA_FAULT", 1.1);
+    let results = chi_square(&faulty, &evaluating(), &configurations);
+    assert_eq!(failures(&configurations, &results).len(), configurations.len(), "{results:?}");
+}
+
+/// A density that is too small by 3 % is noticed, since the samples that it does not account for are a cell.
+#[test]
+fn a_wrong_normalisation_is_noticed() {
+    let configurations = [Configuration::new(BSDF_LAMBERTIAN, [1.0; 3], direction(0.6, 1.0))];
+    let faulty = evaluating().define("PDF_FAULT", 0.97);
+    let results = chi_square(&scattering(), &faulty, &configurations);
+    assert_eq!(failures(&configurations, &results).len(), 1, "{results:?}");
+}
+
+/// The quadrature that the expectations rest on is good to a part of a count: against one of four times the order, with
+/// the model in f64.
+#[test]
+fn the_quadrature_has_converged() {
+    for c in configurations().iter().filter(|c| c.kind == BSDF_METALLIC_ROUGHNESS) {
+        let model = MetallicRoughness::new(c);
+        let integrate = |order| {
+            let mut sums = vec![0.0; bins(c).len()];
+            bins(c).nodes(order).iter().for_each(|node| sums[node.bin] += model.pdf(c.wo, node.wi) * node.weight);
+            sums
+        };
+        for (coarse, fine) in integrate(ORDER).into_iter().zip(integrate(4 * ORDER)) {
+            // A tenth of the standard deviation of the count.
+            let tolerance = 0.1 * (fine.max(1.0 / SAMPLES as f64) / SAMPLES as f64).sqrt();
+            assert!((coarse - fine).abs() < tolerance, "{c:?}: {coarse} and {fine}");
+        }
+    }
+}
+
+/// The continuous part, the delta lobes and what the single-scattering model loses are all there is.
+#[test]
+fn densities_integrate_to_their_share() {
+    let configurations = configurations();
+    for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
+        let continuous: f64 = integrals.pdf.iter().sum();
+        let all = continuous + delta_probabilities(c).iter().sum::<f64>();
+        assert!(all < 1.0 + 1e-3, "{c:?}: {all}");
+        // The density of visible normals integrates to 1. Along the normal, those beyond 45° are reflected below the
+        // surface: of the GGX lobe that is α²/(1 + α²).
+        if c.wo.y == 1.0 {
+            let specular = if c.alpha == 0.0 { 0.0 } else { MetallicRoughness::new(c).lobes(1.0).x };
+            let a2 = f64::from(c.alpha).powi(2);
+            assert!((all - (1.0 - specular * a2 / (1.0 + a2))).abs() < 2e-4, "{c:?}: {all}");
+        }
+    }
+}
+
+/// No lobe alone gives back more than it gets; a Lambertian surface gives its albedo.
+#[test]
+fn lobes_conserve_energy() {
+    let mut configurations = Vec::new();
+    for roughness in ROUGHNESS.into_iter().skip(1) {
+        for cosine in COSINES.into_iter().filter(|cosine| *cosine > 0.01) {
+            let wo = direction(cosine, 1.0);
+            let white = Configuration::metallic_roughness(roughness, 1.0, 1.5, 0.0, wo);
+            configurations.push(Configuration { color: [1.0; 3], ..white });
+        }
+    }
+    for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
+        let albedo = luminance(integrals.albedo);
+        // The quadrature's error and, for the narrowest lobe, that of f32 directions.
+        let slack = 1e-3 + c.rounding(c.wo);
+        assert!(albedo <= 1.0 + slack, "{c:?}: {albedo}");
+        if c.alpha < 0.01 && c.wo.y > 0.7 {
+            assert!((albedo - 1.0).abs() < slack, "a smooth white metal reflects all: {c:?}: {albedo}");
+        }
+        // At α = 1 and normal incidence the integral is elementary.
+        if c.alpha == 1.0 && c.wo.y == 1.0 {
+            assert!((albedo - (1.0 - 2.0_f64.ln())).abs() < 1e-4, "{c:?}: {albedo}");
+        }
+    }
+    let lambertian =
+        [0.9, 1e-3].map(|cosine| Configuration::new(BSDF_LAMBERTIAN, [0.8, 0.5, 0.2], direction(cosine, 2.0)));
+    for integrals in integrate(&evaluating(), &lambertian) {
+        assert!((integrals.albedo - DVec3::new(0.8, 0.5, 0.2)).abs().max_element() < 1e-4, "{}", integrals.albedo);
+    }
+}
+
+/// At directions that were scattered: the density that came with a sample is the one that is evaluated, and the weight is
+/// f·cos/pdf; both agree with the model in f64; and f is the same from both sides.
+#[test]
+fn samples_agree_with_evaluation() {
+    const EACH: usize = 512;
+    let configurations = configurations();
+    let samples = scatter(&scattering(), &configurations, EACH, 2);
+    let at: Vec<(usize, DVec3)> = samples.iter().enumerate().map(|(i, s)| (i / EACH, s.wi)).collect();
+    let values = evaluate(&evaluating(), &configurations, &at);
+    for ((sample, value), (index, _)) in samples.iter().zip(&values).zip(&at) {
+        if sample.is_delta() || sample.is_absorbed() {
+            assert!(sample.pdf == 0.0, "{sample:?}");
+            continue;
+        }
+        check_sample(&configurations[*index], sample, value);
+    }
+}
+
+fn check_sample(c: &Configuration, sample: &Sample, value: &Value) {
+    let close = |a: f64, b: f64, tolerance: f64| (a - b).abs() <= tolerance * a.abs().max(b.abs());
+    let all_close = |a: DVec3, b: DVec3, tolerance| (0..3).all(|i| close(a[i], b[i], tolerance));
+    let context = || format!("{c:?}: {sample:?}, {value:?}");
+    assert!(sample.wi.y > 0.0 && (sample.wi.length() - 1.0).abs() < 1e-6, "{}", context());
+    assert!(close(sample.pdf, value.pdf, 1e-5), "{}", context());
+    assert!(all_close(sample.weight, value.f * (sample.wi.y / value.pdf), 1e-5), "{}", context());
+    // Fused or not, D amplifies the rounding of the half vector.
+    let tolerance = 2e-5 + 4.0 * c.rounding(sample.wi);
+    assert!(all_close(value.f, value.reverse_f, tolerance), "not reciprocal: {}", context());
+    if c.kind == BSDF_METALLIC_ROUGHNESS {
+        let model = MetallicRoughness::new(c);
+        assert!(close(value.pdf, model.pdf(c.wo, sample.wi), tolerance), "{}", context());
+        assert!(all_close(value.f, model.evaluate(c.wo, sample.wi), tolerance), "{}", context());
+    }
+}
+
+/// Nothing is lost to infinities at the most grazing angles and the narrowest lobes.
+#[test]
+fn everything_is_finite_at_grazing_angles() {
+    let mut configurations = Vec::new();
+    for roughness in ROUGHNESS {
+        for cosine in [1e-3, 1e-5, 1e-6] {
+            for metallic in METALLIC {
+                let wo = direction(cosine, 2.0);
+                configurations.push(Configuration::metallic_roughness(roughness, metallic, 1.5, 0.5, wo));
+            }
+        }
+    }
+    let samples = scatter(&scattering(), &configurations, SAMPLES, 3);
+    for (i, sample) in samples.iter().enumerate() {
+        let c = &configurations[i / SAMPLES];
+        assert!(sample.weight.is_finite() && sample.pdf.is_finite() && sample.wi.is_finite(), "{c:?}: {sample:?}");
+        assert!(sample.weight.min_element() >= 0.0 && sample.pdf >= 0.0, "{c:?}: {sample:?}");
+        // No lobe is chosen much too seldom: the least probable specular one has 1/21, of a sum of at most 2.
+        assert!(sample.weight.max_element() < 42.0, "{c:?}: {sample:?}");
+    }
+}

@@ -1,0 +1,315 @@
+//! The BSDFs for tests: configurations, calls of shaders/test/bsdf.comp, and the models in f64.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use glam::DVec3;
+use sunfleck::layout::{BSDF_METALLIC_ROUGHNESS, MATERIAL_SCHLICK};
+
+use super::kernel::{TestKernel, floats, texel, vector, vector_texel};
+
+/// Flags of a sample, as in shaders/include/bsdf.glsl.
+pub const SCATTERED_DELTA: u32 = 1;
+pub const SCATTERED_THROUGH: u32 = 2;
+
+/// A BSDF's parameters and a direction to look from; numbers are those that the shader gets.
+#[derive(Clone, Copy, Debug)]
+pub struct Configuration {
+    pub kind: u32,
+    pub schlick: bool,
+    pub color: [f32; 3],
+    pub metallic: f32,
+    pub alpha: f32,
+    pub ior: f32,
+    pub eta: f32,
+    pub transmission: f32,
+    pub wo: DVec3,
+}
+
+impl Configuration {
+    pub fn new(kind: u32, color: [f32; 3], wo: DVec3) -> Self {
+        Self { kind, schlick: false, color, metallic: 0.0, alpha: 0.0, ior: 1.5, eta: 1.5, transmission: 0.0, wo }
+    }
+
+    pub fn metallic_roughness(roughness: f32, metallic: f32, ior: f32, transmission: f32, wo: DVec3) -> Self {
+        let alpha = roughness * roughness;
+        let color = [0.9, 0.7, 0.4];
+        Self { metallic, alpha, ior, eta: ior, transmission, ..Self::new(BSDF_METALLIC_ROUGHNESS, color, wo) }
+    }
+
+    fn texels(&self) -> [[u32; 4]; 4] {
+        let [r, g, b] = self.color.map(f32::to_bits);
+        [
+            [r, g, b, self.kind | if self.schlick { MATERIAL_SCHLICK } else { 0 }],
+            texel(self.metallic, self.alpha, self.ior, self.eta),
+            texel(self.transmission, 0.0, 0.0, 0.0),
+            vector_texel(self.wo, 0),
+        ]
+    }
+
+    /// How much the rounding of directions to f32 can change D(h), relatively: the half vector's slope is known to
+    /// 2^-24 / cos θh·(cos θo + cos θi)/2, and d ln D / d slope is at most 2/α.
+    pub fn rounding(&self, wi: DVec3) -> f64 {
+        let alpha = f64::from(self.alpha);
+        if alpha == 0.0 { 0.0 } else { 2.0 / alpha * 2.0_f64.powi(-23) / (self.wo.y + wi.y).max(1e-30) }
+    }
+}
+
+/// The direction at an angle of the given cosine to +Y, rounded to f32.
+pub fn direction(cosine: f64, azimuth: f64) -> DVec3 {
+    let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
+    round(DVec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin()))
+}
+
+/// To f32 and back.
+pub fn round(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3()
+}
+
+/// What `bsdf_scatter` gave.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    pub wi: DVec3,
+    pub weight: DVec3,
+    pub pdf: f64,
+    pub flags: u32,
+}
+
+impl Sample {
+    pub fn is_delta(&self) -> bool {
+        self.flags & SCATTERED_DELTA != 0
+    }
+
+    pub fn is_absorbed(&self) -> bool {
+        self.weight == DVec3::ZERO
+    }
+}
+
+/// What `bsdf_evaluate` and `bsdf_pdf` gave for (wo, wi), and with the two exchanged.
+#[derive(Clone, Copy, Debug)]
+pub struct Value {
+    pub f: DVec3,
+    pub pdf: f64,
+    pub reverse_f: DVec3,
+}
+
+fn inputs(configurations: &[Configuration], samples: usize, seed: u32) -> Vec<[u32; 4]> {
+    let mut inputs = vec![[configurations.len() as u32, samples as u32, seed, 0]];
+    inputs.extend(configurations.iter().flat_map(Configuration::texels));
+    inputs
+}
+
+/// `samples` samples of each configuration, one after the other.
+pub fn scatter(kernel: &TestKernel, configurations: &[Configuration], samples: usize, seed: u32) -> Vec<Sample> {
+    let outputs = kernel.run(&inputs(configurations, samples, seed), configurations.len() * samples, 2);
+    let sample =
+        |t: &[[u32; 4]]| Sample { wi: vector(t[0]), weight: vector(t[1]), pdf: floats(t[1])[3].into(), flags: t[0][3] };
+    outputs.chunks_exact(2).map(sample).collect()
+}
+
+/// The shader's values at pairs of (index of the configuration, wi). `kernel` defines EVALUATE.
+pub fn evaluate(kernel: &TestKernel, configurations: &[Configuration], at: &[(usize, DVec3)]) -> Vec<Value> {
+    let mut inputs = inputs(configurations, 1, 0);
+    inputs.extend(at.iter().map(|(index, wi)| vector_texel(*wi, *index as u32)));
+    let outputs = kernel.run(&inputs, at.len(), 2);
+    let value = |t: &[[u32; 4]]| Value { f: vector(t[0]), pdf: floats(t[0])[3].into(), reverse_f: vector(t[1]) };
+    outputs.chunks_exact(2).map(value).collect()
+}
+
+pub fn luminance(c: DVec3) -> f64 {
+    c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// glTF's metallic-roughness model in f64 (specification 2.0, appendix B.3).
+pub struct MetallicRoughness {
+    alpha: f64,
+    transmission: f64,
+    f0: DVec3,
+    diffuse: DVec3,
+}
+
+impl MetallicRoughness {
+    pub fn new(c: &Configuration) -> Self {
+        let color = DVec3::from(c.color.map(f64::from));
+        let (ior, metallic) = (f64::from(c.ior), f64::from(c.metallic));
+        let f0 = DVec3::splat(((ior - 1.0) / (ior + 1.0)).powi(2)).lerp(color, metallic);
+        Self { alpha: c.alpha.into(), transmission: c.transmission.into(), f0, diffuse: color * (1.0 - metallic) }
+    }
+
+    pub fn fresnel(&self, cosine: f64) -> DVec3 {
+        self.f0 + (DVec3::ONE - self.f0) * (1.0 - cosine).powi(5)
+    }
+
+    /// Weight of the thin-walled transmission before its probability is divided out.
+    pub fn through(&self, cosine: f64) -> DVec3 {
+        (DVec3::ONE - self.fresnel(cosine)) * self.transmission * self.diffuse
+    }
+
+    /// Probabilities of the specular, the diffuse and the transmitting lobe.
+    pub fn lobes(&self, cosine: f64) -> DVec3 {
+        let mean = self.f0 + (DVec3::ONE - self.f0) / 21.0;
+        let base = luminance(self.diffuse);
+        let weights = DVec3::new(
+            luminance(self.fresnel(cosine).max(mean)),
+            base * (1.0 - self.transmission) * (1.0 - luminance(mean)),
+            base * self.transmission * (1.0 - luminance(self.fresnel(cosine))),
+        );
+        weights / weights.element_sum()
+    }
+
+    fn distribution(&self, h: DVec3) -> f64 {
+        let a2 = self.alpha * self.alpha;
+        a2 / (PI * (h.x * h.x + h.z * h.z + a2 * h.y * h.y).powi(2))
+    }
+
+    /// Smith's Λ.
+    fn lambda(&self, cosine: f64) -> f64 {
+        let tan2 = (1.0 - cosine * cosine) / (cosine * cosine);
+        0.5 * ((1.0 + self.alpha * self.alpha * tan2).sqrt() - 1.0)
+    }
+
+    pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
+        if wi.y <= 0.0 {
+            return 0.0;
+        }
+        let lobes = self.lobes(wo.y);
+        let mut pdf = lobes.y * wi.y / PI;
+        if self.alpha > 0.0 {
+            let h = (wo + wi).normalize();
+            pdf += lobes.x * self.distribution(h) / (1.0 + self.lambda(wo.y)) / (4.0 * wo.y);
+        }
+        pdf
+    }
+
+    pub fn evaluate(&self, wo: DVec3, wi: DVec3) -> DVec3 {
+        let h = (wo + wi).normalize();
+        let fresnel = self.fresnel(wo.dot(h));
+        let mut f = (DVec3::ONE - fresnel) * self.diffuse * ((1.0 - self.transmission) / PI);
+        if self.alpha > 0.0 {
+            let masking = 1.0 / (1.0 + self.lambda(wo.y) + self.lambda(wi.y));
+            f += fresnel * self.distribution(h) * masking / (4.0 * wo.y * wi.y);
+        }
+        f
+    }
+}
+
+/// Bins of directions that resolve a lobe however narrow: rings of the half vector's polar angle around the normal, cut
+/// into sectors of its azimuth counted from wo's.
+pub struct HalfVectorBins {
+    wo: DVec3,
+    azimuth: f64,
+    /// Ascending polar angles, 0 to π/2.
+    rings: Vec<f64>,
+}
+
+/// A point of the quadrature over a bin: its weight is a solid angle of wi.
+pub struct Node {
+    pub bin: usize,
+    pub wi: DVec3,
+    pub weight: f64,
+}
+
+const SECTORS: usize = 8;
+
+impl HalfVectorBins {
+    pub fn new(alpha: f64, wo: DVec3) -> Self {
+        let tangents = (1..10).map(|i| f64::from(i) / 10.0).map(|t| alpha * (t / (1.0 - t)).sqrt());
+        // Rings of equal probability for the GGX lobe, rings of equal width for what is broad.
+        let mut rings: Vec<f64> = tangents.map(f64::atan).filter(|angle| *angle > 0.0).collect();
+        rings.extend((1..=8).map(|i| f64::from(i) / 8.0 * FRAC_PI_2));
+        rings.sort_by(f64::total_cmp);
+        rings.dedup_by(|a, b| (*a - *b).abs() < 1e-3 * *b);
+        // A lobe's tail falls by powers of the angle: no ring may span too many of them.
+        let mut angle = rings[0];
+        while angle < rings[rings.len() - 1] {
+            let next = rings[rings.partition_point(|ring| *ring <= angle)];
+            angle = next.min(4.0 * angle);
+            if angle < next {
+                rings.insert(rings.partition_point(|ring| *ring < angle), angle);
+            }
+        }
+        rings.insert(0, 0.0);
+        Self { wo, azimuth: wo.z.atan2(wo.x), rings }
+    }
+
+    pub fn len(&self) -> usize {
+        (self.rings.len() - 1) * SECTORS
+    }
+
+    pub fn bin(&self, wi: DVec3) -> usize {
+        let h = self.wo + wi;
+        let polar = h.x.hypot(h.z).atan2(h.y);
+        let turns = ((h.z.atan2(h.x) - self.azimuth) / (2.0 * PI) + 0.5).rem_euclid(1.0);
+        let ring = self.rings.partition_point(|ring| *ring <= polar).clamp(1, self.rings.len() - 1) - 1;
+        ring * SECTORS + ((turns * SECTORS as f64) as usize).min(SECTORS - 1)
+    }
+
+    /// Nodes of a Gauss-Legendre rule over every bin, `order` of them along the polar angle for a smooth piece.
+    pub fn nodes(&self, order: usize) -> Vec<Node> {
+        let polar_rule = gauss_legendre(order);
+        let azimuth_rule = gauss_legendre(4);
+        // Where a ring of half vectors begins and ends to be cut by the horizon of wi.
+        let tilt = 0.5 * self.wo.y.clamp(-1.0, 1.0).acos();
+        let mut nodes = Vec::new();
+        for (ring, limits) in self.rings.windows(2).enumerate() {
+            let mut pieces = vec![limits[0], limits[1]];
+            pieces.extend([FRAC_PI_4 - tilt, FRAC_PI_4 + tilt].iter().filter(|t| limits[0] < **t && **t < limits[1]));
+            pieces.sort_by(f64::total_cmp);
+            for piece in pieces.windows(2) {
+                for (x, weight) in &polar_rule {
+                    let polar = piece[0] + (piece[1] - piece[0]) * x;
+                    self.add_ring(&mut nodes, ring, polar, weight * (piece[1] - piece[0]), &azimuth_rule);
+                }
+            }
+        }
+        nodes
+    }
+
+    fn add_ring(&self, nodes: &mut Vec<Node>, ring: usize, polar: f64, weight: f64, rule: &[(f64, f64)]) {
+        let (sin_h, cos_h) = polar.sin_cos();
+        let sine = self.wo.x.hypot(self.wo.z);
+        // wi.y = 2 (wo·h) cos θh − wo.y > 0, solved for the azimuth.
+        let limit = (self.wo.y / (2.0 * cos_h) - self.wo.y * cos_h) / (sine * sin_h);
+        let widest = if limit <= -1.0 {
+            PI
+        } else if limit < 1.0 {
+            limit.acos()
+        } else {
+            0.0
+        };
+        for sector in 0..SECTORS {
+            let step = 2.0 * PI / SECTORS as f64;
+            let low = (sector as f64 * step - PI).max(-widest);
+            let high = ((sector + 1) as f64 * step - PI).min(widest);
+            for (x, azimuth_weight) in rule.iter().filter(|_| low < high) {
+                let angle = self.azimuth + low + (high - low) * x;
+                let h = DVec3::new(sin_h * angle.cos(), cos_h, sin_h * angle.sin());
+                let cosine = self.wo.dot(h);
+                let solid_angle = 4.0 * cosine * sin_h * weight * azimuth_weight * (high - low);
+                nodes.push(Node {
+                    bin: ring * SECTORS + sector,
+                    wi: h * (2.0 * cosine) - self.wo,
+                    weight: solid_angle,
+                });
+            }
+        }
+    }
+}
+
+/// Nodes and weights on [0, 1], by Newton's steps on the Legendre polynomial.
+pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+    let node = |i: usize| {
+        let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
+        let mut slope = 0.0;
+        for _ in 0..50 {
+            let (mut p0, mut p1) = (1.0, x);
+            for k in 2..=n {
+                let k = k as f64;
+                (p0, p1) = (p1, ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k);
+            }
+            slope = n as f64 * (x * p1 - p0) / (x * x - 1.0);
+            x -= p1 / slope;
+        }
+        (0.5 + 0.5 * x, 1.0 / ((1.0 - x * x) * slope * slope))
+    };
+    (0..n).map(node).collect()
+}

@@ -1,0 +1,152 @@
+//! Kernels of shaders/test/ with a scene, specialisation constants and macro definitions of the test's own choice.
+
+use glam::{DAffine3, DVec3};
+use sunfleck::gpu::TraceBackend;
+use sunfleck::layout::RenderConstants;
+use sunfleck::prepare::Prepared;
+use sunfleck::render::FunctionCall;
+use sunfleck::scene::{Camera, Projection, Scene, builtin};
+
+use super::gpu;
+
+/// A kernel, ready to be called.
+pub struct TestKernel {
+    file: String,
+    /// The scene that is bound; a test may replace what is in it.
+    pub prepared: Prepared,
+    /// Its constants.
+    pub constants: RenderConstants,
+    /// The back end; only kernels that trace need the one under test.
+    pub trace: TraceBackend,
+    specialization: Vec<(u32, u32)>,
+    defines: Vec<(&'static str, String)>,
+}
+
+impl TestKernel {
+    /// `shaders/test/<file>` with a scene that does not matter.
+    pub fn new(file: &str) -> Self {
+        Self::with_scene(file, &builtin::builtin("cornell").expect("built in"))
+    }
+
+    /// `shaders/test/<file>` with a scene, whose first camera decides where the rebased space has its zero.
+    pub fn with_scene(file: &str, scene: &Scene) -> Self {
+        let (prepared, constants) = gpu::prepared(scene, &gpu::settings(64, 64));
+        Self {
+            file: format!("test/{file}"),
+            prepared,
+            constants,
+            trace: TraceBackend::Bvh,
+            specialization: Vec::new(),
+            defines: Vec::new(),
+        }
+    }
+
+    /// Sets a specialisation constant of shaders/include/features.glsl.
+    #[must_use]
+    pub fn specialize(mut self, id: u32, value: u32) -> Self {
+        self.specialization.push((id, value));
+        self
+    }
+
+    /// Defines a macro.
+    #[must_use]
+    pub fn define(mut self, name: &'static str, value: impl ToString) -> Self {
+        self.defines.push((name, value.to_string()));
+        self
+    }
+
+    /// Runs `lanes` lanes; every lane gives `outputs_per_lane` texels.
+    pub fn run(&self, inputs: &[[u32; 4]], lanes: usize, outputs_per_lane: u32) -> Vec<[u32; 4]> {
+        let call = FunctionCall {
+            sources: gpu::sources(),
+            file: &self.file,
+            trace: self.trace,
+            prepared: &self.prepared,
+            constants: self.constants,
+            specialization: &self.specialization,
+            defines: &self.defines,
+        };
+        let lanes = u32::try_from(lanes).expect("fewer lanes");
+        let outputs = call.run(&gpu::device().gpu, inputs, lanes, outputs_per_lane).expect("the kernel runs");
+        gpu::assert_no_validation_messages();
+        outputs
+    }
+}
+
+/// A scene of nothing but a camera.
+pub fn empty_scene() -> Scene {
+    Scene { name: String::from("test"), cameras: vec![camera()], ..Scene::default() }
+}
+
+/// A camera at the origin, for scenes whose picture does not matter.
+pub fn camera() -> Camera {
+    Camera {
+        name: String::from("camera"),
+        camera_to_world: DAffine3::IDENTITY,
+        projection: Projection::Perspective { yfov_radians: 1.0 },
+        lens_radius: 0.0,
+        focus_distance: 1.0,
+    }
+}
+
+/// The floats of a texel.
+pub fn floats(texel: [u32; 4]) -> [f32; 4] {
+    texel.map(f32::from_bits)
+}
+
+/// The first three floats of a texel.
+pub fn vector(texel: [u32; 4]) -> DVec3 {
+    let [x, y, z, _] = floats(texel);
+    DVec3::new(x.into(), y.into(), z.into())
+}
+
+/// A texel of floats.
+pub fn texel(x: f32, y: f32, z: f32, w: f32) -> [u32; 4] {
+    [x, y, z, w].map(f32::to_bits)
+}
+
+/// A texel of a vector and a word.
+pub fn vector_texel(v: DVec3, word: u32) -> [u32; 4] {
+    [(v.x as f32).to_bits(), (v.y as f32).to_bits(), (v.z as f32).to_bits(), word]
+}
+
+/// Random numbers for tests: SplitMix64 (Steele, Lea and Flood 2014).
+pub struct Random(pub u64);
+
+impl Random {
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Uniform in [low, high).
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform below `n`.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.unit() * n as f64) as usize
+    }
+
+    /// Uniform on the unit sphere.
+    pub fn direction(&mut self) -> DVec3 {
+        let y = self.between(-1.0, 1.0);
+        let (sin, cos) = (self.unit() * std::f64::consts::TAU).sin_cos();
+        let r = (1.0 - y * y).sqrt();
+        DVec3::new(r * cos, y, r * sin)
+    }
+
+    /// Uniform in the box of the given half extent.
+    pub fn point(&mut self, half: f64) -> DVec3 {
+        DVec3::new(self.between(-half, half), self.between(-half, half), self.between(-half, half))
+    }
+}

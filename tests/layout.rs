@@ -1,0 +1,283 @@
+//! src/layout.rs and shaders/include/layout.glsl are the same: blocks by reflection of the SPIR-V, records of the scene
+//! arrays by a kernel that decodes them, constants by the texts.
+
+mod common;
+
+use std::any::type_name_of_val;
+use std::collections::BTreeMap;
+use std::mem::offset_of;
+use std::path::Path;
+
+use common::gpu;
+use common::kernel::{Random, TestKernel, floats};
+use spirq::ReflectConfig;
+use spirq::ty::{StructType, Type};
+use spirq::var::Variable;
+use sunfleck::gpu::shader_compiler;
+use sunfleck::layout::{self, BlockResult, RenderConstants, SliceConstants};
+
+/// Name, offset and type of a field as GLSL has it: an array on the Rust side is one field an element on the other.
+type Field = (String, usize, String);
+
+/// The fields of a Rust struct, in order.
+macro_rules! rust_fields {
+    ($type:ty: $($field:ident),* $(,)?) => {{
+        let value: $type = bytemuck::Zeroable::zeroed();
+        vec![$((stringify!($field).to_owned(), offset_of!($type, $field), rust_type(&value.$field))),*]
+    }};
+}
+
+fn rust_type<T>(value: &T) -> String {
+    match type_name_of_val(value) {
+        "[f32; 3]" => "vec3<f32>".to_owned(),
+        name => name.to_owned(),
+    }
+}
+
+fn shader_fields(block: &StructType) -> Vec<Field> {
+    let member = |m: &spirq::ty::StructMember| {
+        (m.name.clone().unwrap_or_default(), m.offset.expect("laid out"), format!("{}", m.ty))
+    };
+    block.members.iter().map(member).collect()
+}
+
+/// Splits the named field into scalars with the given suffixes.
+fn split(fields: &mut Vec<Field>, name: &str, suffixes: &[&str], scalar: &str) {
+    let at = fields.iter().position(|f| f.0 == name).expect("the field exists");
+    let offset = fields[at].1;
+    let parts =
+        suffixes.iter().zip(0..).map(|(s, i): (_, usize)| (format!("{name}{s}"), offset + 4 * i, scalar.into()));
+    fields.splice(at..=at, parts);
+}
+
+struct Blocks {
+    constants: StructType,
+    slice: StructType,
+    results: (StructType, usize),
+    lane_stride: usize,
+}
+
+fn array_of_structs(block: &Type) -> (StructType, usize) {
+    let Type::Struct(outer) = block else { panic!("no block: {block}") };
+    let Type::Array(array) = &outer.members[0].ty else { panic!("no array in {block}") };
+    let Type::Struct(element) = &*array.element_ty else { panic!("no struct in {block}") };
+    (element.clone(), array.stride.expect("laid out"))
+}
+
+/// spirq knows few operations on specialisation constants, and no block depends on one: those with a boolean result
+/// (OpSpecConstantOp) become OpConstantTrue.
+fn without_boolean_constants(spirv: &[u32]) -> Vec<u32> {
+    const TYPE_BOOL: u32 = 20;
+    const CONSTANT_TRUE: u32 = 41;
+    const SPEC_CONSTANT_OP: u32 = 52;
+    let mut words = spirv[..5].to_vec();
+    let mut rest = &spirv[5..];
+    let mut boolean = None;
+    while let Some(&first) = rest.first() {
+        let (instruction, others) = rest.split_at((first >> 16) as usize);
+        match first & 0xffff {
+            TYPE_BOOL => boolean = Some(instruction[1]),
+            SPEC_CONSTANT_OP if Some(instruction[1]) == boolean => {
+                words.extend([3 << 16 | CONSTANT_TRUE, instruction[1], instruction[2]]);
+                rest = others;
+                continue;
+            }
+            _ => {}
+        }
+        words.extend_from_slice(instruction);
+        rest = others;
+    }
+    words
+}
+
+/// Reflects the blocks of the path-tracing kernel, compiled without optimisation so that all members keep their names.
+fn reflect() -> Blocks {
+    let defines = [("TRACE_BACKEND", "0".to_owned()), ("ARRAY_FORM", "0".to_owned())];
+    let spirv = shader_compiler::compile(gpu::sources(), "path_trace.comp", &defines, false).expect("it compiles");
+    let entries = ReflectConfig::new()
+        .spv(without_boolean_constants(&spirv))
+        .ref_all_rscs(true)
+        .reflect()
+        .expect("the SPIR-V is readable");
+    let vars = &entries.first().expect("an entry point").vars;
+    let binding = |number: u32| {
+        let found = vars.iter().find_map(|var| match var {
+            Variable::Descriptor { desc_bind, ty, .. } if desc_bind.bind() == number => Some(ty),
+            _ => None,
+        });
+        found.unwrap_or_else(|| panic!("binding {number} is there"))
+    };
+    let push = vars.iter().find_map(|var| match var {
+        Variable::PushConstant { ty, .. } => Some(ty),
+        _ => None,
+    });
+    let only_member = |ty: &Type| {
+        let Type::Struct(outer) = ty else { panic!("no block: {ty}") };
+        let Type::Struct(inner) = &outer.members[0].ty else { panic!("no struct in {ty}") };
+        inner.clone()
+    };
+    Blocks {
+        constants: only_member(binding(0)),
+        results: array_of_structs(binding(1)),
+        lane_stride: array_of_structs(binding(2)).1,
+        slice: only_member(push.expect("push constants")),
+    }
+}
+
+fn render_constants_fields() -> Vec<Field> {
+    rust_fields!(RenderConstants: camera_origin, lens_radius, camera_right, focus_distance, camera_up, projection,
+        camera_forward, unused, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
+        materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
+        environment_height, environment_marginal_word, environment_conditional_word, unused_too, environment_radiance,
+        environment_cos, scene_center, environment_sin)
+}
+
+#[test]
+fn blocks_have_the_same_offsets_on_both_sides() {
+    let blocks = reflect();
+    assert_eq!(shader_fields(&blocks.constants), render_constants_fields());
+    assert_eq!(Type::Struct(blocks.constants).nbyte(), Some(size_of::<RenderConstants>()));
+
+    let mut slice = rust_fields!(SliceConstants: first_atom, lanes, first_block, ray_budget, resume, unused);
+    split(&mut slice, "unused", &["_0", "_1", "_2"], "u32");
+    assert_eq!(shader_fields(&blocks.slice), slice);
+    assert_eq!(Type::Struct(blocks.slice).nbyte(), Some(size_of::<SliceConstants>()));
+
+    let mut result = rust_fields!(BlockResult: sum, luminance_squared, compensation, rays, non_finite, capped,
+        complete, samples);
+    split(&mut result, "sum", &["_r", "_g", "_b"], "f32");
+    split(&mut result, "compensation", &["_r", "_g", "_b"], "f32");
+    assert_eq!(shader_fields(&blocks.results.0), result);
+    assert_eq!(blocks.results.1, size_of::<BlockResult>(), "stride of the results");
+    assert_eq!(blocks.lane_stride, layout::LANE_STATE_BYTES, "stride of the lane states");
+}
+
+/// The comparison sees a field that moves.
+#[test]
+fn a_moved_field_is_noticed() {
+    let mut fields = render_constants_fields();
+    fields.swap(4, 6);
+    assert_ne!(shader_fields(&reflect().constants), fields);
+}
+
+/// `name = value` of all lines that start with `prefix`, as text.
+fn parse_constants(text: &str, prefix: &str) -> BTreeMap<String, String> {
+    let lines = text.lines().filter_map(|line| line.strip_prefix(prefix)?.split_once('='));
+    let name = |name: &str| name.trim().trim_end_matches(": u32").to_owned();
+    lines.map(|(left, right)| (name(left), right.trim().trim_end_matches(';').to_owned())).collect()
+}
+
+/// A number, or `1 << n`, `(1 << n) - 1` or `u32::MAX`.
+fn value(text: &str) -> u32 {
+    if text == "u32::MAX" {
+        return u32::MAX;
+    }
+    if let Some(mask) = text.strip_prefix('(').and_then(|t| t.strip_suffix(") - 1")) {
+        return value(mask) - 1;
+    }
+    if let Some(shift) = text.strip_prefix("1 << ") {
+        return 1 << value(shift);
+    }
+    let digits = text.trim_end_matches('u');
+    let parsed = match digits.strip_prefix("0x") {
+        Some(hex) => u32::from_str_radix(hex, 16),
+        None => digits.parse(),
+    };
+    parsed.unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+#[test]
+fn constants_have_the_same_values_on_both_sides() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/layout.rs");
+    let rust = parse_constants(&std::fs::read_to_string(file).expect("src/layout.rs"), "pub const ");
+    let rust: BTreeMap<_, _> =
+        rust.iter().filter(|(name, _)| !name.contains(':')).map(|(n, v)| (n, value(v))).collect();
+    let shader = parse_constants(&gpu::sources()["include/layout.glsl"], "const uint ");
+    let shader: BTreeMap<_, _> = shader.iter().map(|(n, v)| (n, value(v))).collect();
+    assert!(rust.len() > 30, "the constants are found: {rust:?}");
+    assert_eq!(rust, shader);
+    // The parser reads what the compiler does.
+    assert_eq!(rust[&"SLOT_MATERIAL_MASK".to_owned()], layout::SLOT_MATERIAL_MASK);
+    assert_eq!(rust[&"MATERIAL_SCHLICK".to_owned()], layout::MATERIAL_SCHLICK);
+    assert_eq!(rust[&"NONE".to_owned()], layout::NONE);
+}
+
+const RECORDS: usize = 5;
+
+/// Random words that are normal floats too, so that no driver may change them on the way.
+fn random_records<T: bytemuck::Pod>(random: &mut Random) -> Vec<T> {
+    let word = |random: &mut Random| (random.between(1.0, 2.0) as f32).to_bits();
+    let words: Vec<u32> = (0..RECORDS * size_of::<T>() / 4).map(|_| word(random)).collect();
+    bytemuck::pod_collect_to_vec(&words)
+}
+
+/// Rust records packed as `prepare` does, and the same decoded by the shader.
+#[test]
+fn records_survive_the_way_to_the_shader() {
+    let mut random = Random(1);
+    let mut kernel = TestKernel::new("records.comp");
+    let materials: Vec<layout::Material> = random_records(&mut random);
+    let lights: Vec<layout::Light> = random_records(&mut random);
+    let headers: Vec<layout::TextureHeader> = random_records(&mut random);
+    let instances: Vec<layout::InstanceRecord> = random_records(&mut random);
+    let leaves: Vec<layout::LeafSlot> = random_records(&mut random);
+    let vertices: Vec<layout::Vertex> = random_records(&mut random);
+    let texels: Vec<[u32; 4]> = random_records(&mut random);
+    let both = layout::TRIANGLE_NORMALS | layout::TRIANGLE_TEXCOORDS;
+    let triangle = |i: u32| layout::Triangle { vertices: [0, 1, RECORDS as u32 - 1 - i], flags: both };
+    let triangles: Vec<layout::Triangle> = (0..RECORDS as u32).map(triangle).collect();
+
+    let constants = &mut kernel.constants;
+    let [slots, attributes, tables, image, environment] = &mut kernel.prepared.arrays;
+    *slots = bytemuck::cast_slice(&leaves).to_vec();
+    *attributes = bytemuck::cast_slice(&triangles).to_vec();
+    constants.vertices = attributes.len() as u32;
+    attributes.extend_from_slice(bytemuck::cast_slice(&vertices));
+    tables.clear();
+    let mut append = |texels: &[[u32; 4]]| {
+        let first = tables.len() as u32;
+        tables.extend_from_slice(texels);
+        first
+    };
+    constants.materials = append(bytemuck::cast_slice(&materials));
+    constants.textures = append(bytemuck::cast_slice(&headers));
+    constants.lights = append(bytemuck::cast_slice(&lights));
+    constants.instances = append(bytemuck::cast_slice(&instances));
+    *image = texels.clone();
+    *environment = texels.iter().rev().copied().collect();
+
+    let outputs = kernel.run(&[[0; 4]], RECORDS, 24);
+    for (i, output) in outputs.chunks_exact(24).enumerate() {
+        let decoded: &[[u32; 4]] = &output[..4];
+        assert_eq!(decoded, bytemuck::cast_slice::<_, [u32; 4]>(&[without_padding(materials[i])]), "material");
+        let light = layout::Light { unused: [0; 2], ..lights[i] };
+        assert_eq!(&output[4..8], bytemuck::cast_slice::<_, [u32; 4]>(&[light]), "light");
+        assert_eq!(&output[8..9], bytemuck::cast_slice::<_, [u32; 4]>(&[headers[i]]), "texture header");
+        assert_eq!(&output[9..16], bytemuck::cast_slice::<_, [u32; 4]>(&[instances[i]]), "instance");
+        assert_eq!(output[16..19], decoded_leaf(&leaves[i]), "leaf slot");
+        check_vertex(&vertices[RECORDS - 1 - i], output[19], output[20]);
+        assert_eq!(output[21], texels[i], "words");
+        assert_eq!(output[22], texels[i], "texels");
+        assert_eq!(output[23], texels[RECORDS - 1 - i], "environment");
+    }
+}
+
+fn without_padding(material: layout::Material) -> layout::Material {
+    layout::Material { unused: [0; 2], ..material }
+}
+
+fn decoded_leaf(leaf: &layout::LeafSlot) -> [[u32; 4]; 3] {
+    let row = |vertex: [f32; 3], word: u32| {
+        let [x, y, z] = vertex.map(f32::to_bits);
+        [x, y, z, word]
+    };
+    let [a, b, c] = leaf.vertices;
+    [row(a, leaf.triangle), row(b, leaf.light), row(c, leaf.kind & layout::SLOT_MATERIAL_MASK)]
+}
+
+fn check_vertex(vertex: &layout::Vertex, first: [u32; 4], second: [u32; 4]) {
+    let normal = glam::Vec3::from(vertex.normal).normalize();
+    let [x, y, z, u] = floats(first);
+    assert!((glam::Vec3::new(x, y, z) - normal).length() < 1e-6, "normal {normal} became {x} {y} {z}");
+    assert_eq!((u, f32::from_bits(second[0])), (vertex.u, vertex.v), "texture coordinates");
+}
