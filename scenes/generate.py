@@ -20,6 +20,7 @@ class Scene:
 
     def __init__(self):
         self.data = bytearray()
+        self.shapes = {}
         self.doc = {
             "asset": {"version": "2.0", "generator": "sunfleck scenes/generate.py"},
             "scene": 0,
@@ -97,8 +98,13 @@ class Scene:
 
     def mesh(self, name, *parts):
         """Each part is (shape, material); a shape has positions, triangles and maybe normals and texcoords."""
-        primitives = []
-        for shape, material in parts:
+        primitives = [{**self.geometry(shape), "material": material} for shape, material in parts]
+        self.doc["meshes"].append({"name": name, "primitives": primitives})
+        return len(self.doc["meshes"]) - 1
+
+    def geometry(self, shape):
+        """The accessors of a shape; those of one shape are written once."""
+        if id(shape) not in self.shapes:
             attributes = {"POSITION": self.accessor("VEC3", 5126, shape["positions"], True)}
             if "normals" in shape:
                 attributes["NORMAL"] = self.accessor("VEC3", 5126, shape["normals"])
@@ -106,11 +112,10 @@ class Scene:
                 attributes["TEXCOORD_0"] = self.accessor("VEC2", 5126, shape["texcoords"])
             component = 5123 if len(shape["positions"]) < 65535 else 5125
             indices = [(i,) for triangle in shape["triangles"] for i in triangle]
-            primitive = {"attributes": attributes, "material": material}
-            primitive["indices"] = self.accessor("SCALAR", component, indices)
-            primitives.append(primitive)
-        self.doc["meshes"].append({"name": name, "primitives": primitives})
-        return len(self.doc["meshes"]) - 1
+            # The shape is kept beside its accessors, so that its id stays its own.
+            accessors = {"attributes": attributes, "indices": self.accessor("SCALAR", component, indices)}
+            self.shapes[id(shape)] = (shape, accessors)
+        return self.shapes[id(shape)][1]
 
     def node(self, **node):
         self.doc["nodes"].append(node)

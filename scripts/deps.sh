@@ -82,9 +82,10 @@ install_debian() {
     have_layer || wanted+=(vulkan-validationlayers)
     command -v c++ >/dev/null || wanted+=(g++)
     command -v ar >/dev/null || wanted+=(binutils)
-    command -v spirv-val >/dev/null || wanted+=(spirv-tools)
     if ! have_shaderc && [ -n "$(missing_archives)" ]; then
         wanted+=(libshaderc-dev glslang-dev spirv-tools)
+    elif ! command -v spirv-val >/dev/null; then
+        wanted+=(spirv-tools)
     fi
     [ ${#wanted[@]} -eq 0 ] && return
 

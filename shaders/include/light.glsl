@@ -23,7 +23,8 @@ float light_pick_probability(RenderConstants constants, uint light) {
 
 // Emission of a triangle towards a direction on its front (`front`) or back.
 bool emits_to_side(Material material, bool front) {
-    return front || (material.kind_flags & MATERIAL_DOUBLE_SIDED) != 0u;
+    uint sides = material.kind_flags & (MATERIAL_DOUBLE_SIDED | MATERIAL_BLACK_BACK);
+    return front || sides == MATERIAL_DOUBLE_SIDED;
 }
 
 // Uniform by area. `from` is the origin of the shadow ray.

@@ -6,6 +6,9 @@ use clap::Args;
 use serde_json::{Value, json};
 use sunfleck::scene::{Bsdf, Environment, Projection, PunctualKind, Scene, load};
 
+use sunfleck::prepare::Prepared;
+use sunfleck::render::{Settings, prepare_scene};
+
 use super::{print_json, print_warnings};
 
 /// Say what is in a scene, what was added to it and what is skipped.
@@ -23,9 +26,13 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
     let mut scene = load::resolve(&args.scene).map_err(sunfleck::Error::from)?;
     scene.frame_if_no_camera();
     scene.light_if_dark();
+    let prepared = prepare_scene(&scene, &scene.cameras[0], &Settings::default())?;
     print_for_people(&scene);
+    print_prepared(&prepared);
     if args.json {
-        print_json(&describe(&scene))?;
+        let mut object = describe(&scene);
+        object["prepared"] = describe_prepared(&prepared);
+        print_json(&object)?;
     }
     Ok(())
 }
@@ -145,6 +152,41 @@ fn environment(environment: &Environment) -> Value {
             "rotation_degrees": rotation_radians.to_degrees(),
         }),
     }
+}
+
+/// Names of the scene arrays, in their order.
+const ARRAYS: [&str; 5] = ["slots", "attributes", "tables", "texels", "environment"];
+
+fn describe_prepared(prepared: &Prepared) -> Value {
+    let s = &prepared.statistics;
+    let arrays: serde_json::Map<_, _> =
+        ARRAYS.iter().zip(s.array_bytes).map(|(name, bytes)| ((*name).to_owned(), json!(bytes))).collect();
+    json!({
+        "triangles": s.triangles,
+        "placed_triangles": s.placed_triangles,
+        "instances": s.instances,
+        "lights": s.lights,
+        "bvh": {"inner_nodes": s.inner_slots, "depth": s.depth, "sah_cost": s.sah_cost, "build_seconds": s.bvh_seconds},
+        "gpu_bytes": s.array_bytes.iter().sum::<u64>(),
+        "gpu_bytes_by_array": arrays,
+        "kept": prepared.features.kept(),
+        "dropped": prepared.features.dropped(),
+    })
+}
+
+fn print_prepared(prepared: &Prepared) {
+    let s = &prepared.statistics;
+    let total = s.array_bytes.iter().sum::<u64>();
+    eprintln!("  on the GPU   {total} bytes: {}", {
+        let parts: Vec<_> = ARRAYS.iter().zip(s.array_bytes).map(|(name, bytes)| format!("{name} {bytes}")).collect();
+        parts.join(", ")
+    });
+    eprintln!(
+        "  BVH          {} triangles, {} shared instances; {} inner nodes, depth {}, SAH cost {:.1}, {:.3} s",
+        s.triangles, s.instances, s.inner_slots, s.depth, s.sah_cost, s.bvh_seconds
+    );
+    eprintln!("  kernel needs {}", prepared.features.kept().join(", "));
+    eprintln!("  left out     {}", prepared.features.dropped().join(", "));
 }
 
 fn print_for_people(scene: &Scene) {

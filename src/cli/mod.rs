@@ -19,6 +19,7 @@ use std::io::{self, Write};
 
 use anyhow::Context;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use tracing_subscriber::filter::LevelFilter;
 
 /// Exit codes, for `--help`; [`sunfleck::Error::exit_code`] decides them.
 const EXIT_CODES: &str = "\
@@ -75,11 +76,10 @@ pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {
     error.chain().find_map(|e| e.downcast_ref::<sunfleck::Error>()).map_or(1, sunfleck::Error::exit_code)
 }
 
-/// Warnings and diagnostics go to standard error; `RUST_LOG=sunfleck=debug` shows more.
+/// Warnings and diagnostics go to standard error; `RUST_LOG=debug` shows more.
 fn init_tracing() {
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr).without_time().init();
+    let level = std::env::var("RUST_LOG").ok().and_then(|level| level.parse().ok()).unwrap_or(LevelFilter::WARN);
+    tracing_subscriber::fmt().with_max_level(level).with_writer(io::stderr).without_time().init();
 }
 
 /// Prints one JSON object on standard output.

@@ -98,7 +98,8 @@ fn place_instances(
     let reach = all.min.abs().max(all.max.abs()).max(camera.abs()).max_element();
     for (matrices, bounds) in placed {
         let widened = bounds.widened(matrices.rounding_reach(reach));
-        if !(widened.min.abs().max(widened.max.abs()).max_element() <= COORDINATE_LIMIT) {
+        let fits = widened.min.abs().max(widened.max.abs()).max_element() <= COORDINATE_LIMIT;
+        if !fits {
             return Err(PrepareError::TooFar { name: "an instance".to_owned(), limit: COORDINATE_LIMIT });
         }
         acceleration.instance_bounds.push(widened.outward());

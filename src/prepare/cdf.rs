@@ -8,7 +8,7 @@ use crate::layout::CDF_TOTAL;
 ///
 /// Every positive weight is given one count, so that it can be picked however small it is beside the others. The rest R
 /// is dealt out by rounding the cumulative weights: bin i gets ⌊R·Sᵢ₊₁/S⌋ − ⌊R·Sᵢ/S⌋ more. This sums to R exactly, gives
-/// nothing to a zero weight, and a bin's count is within m + 1 of its exact share, for m positive weights.
+/// nothing to a zero weight, and a bin's count is within m + 2 of its exact share, for m positive weights.
 ///
 /// # Panics
 /// If a weight is negative or not finite, or if more than [`CDF_TOTAL`] weights are positive.

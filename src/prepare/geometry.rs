@@ -55,9 +55,9 @@ pub(super) fn gather(
         }
     }
     geometry.world.name = "world".to_owned();
-    for mesh in 0..scene.meshes.len() {
-        let users = scene.instances.iter().enumerate().filter(|(index, i)| stays[*index] && i.mesh == mesh);
-        let center = recentring(&mesh_bounds[mesh]);
+    for (index, (mesh, bounds)) in scene.meshes.iter().zip(&mesh_bounds).enumerate() {
+        let users = scene.instances.iter().enumerate().filter(|(user, i)| stays[*user] && i.mesh == index);
+        let center = recentring(bounds);
         let placements: Vec<Placement> = users
             .map(|(source, _)| Placement {
                 source,
@@ -67,8 +67,8 @@ pub(super) fn gather(
         if placements.is_empty() {
             continue;
         }
-        let mut shared = MeshGeometry { name: scene.meshes[mesh].name.clone(), ..MeshGeometry::default() };
-        for primitive in &scene.meshes[mesh].primitives {
+        let mut shared = MeshGeometry { name: mesh.name.clone(), ..MeshGeometry::default() };
+        for primitive in &mesh.primitives {
             let transform = DAffine3::from_translation(-center);
             add_primitive(primitive, &transform, materials, &mut geometry.attributes, &mut shared)?;
         }

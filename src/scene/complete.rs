@@ -63,18 +63,25 @@ impl Scene {
         ));
     }
 
-    /// Adds a constant white environment if nothing in the scene gives light, and says so in [`Scene::notes`].
-    /// A scene of unlit materials alone is left as it is: they show their colours without light.
+    /// Adds a constant white environment if nothing in the scene is there to light it, and says so in
+    /// [`Scene::notes`]. An emission texture does not count: it paints glowing details on an object (the dial of a
+    /// watch) and would leave the object itself black. A scene of unlit materials alone is left as it is: they show
+    /// their colours without light.
     pub fn light_if_dark(&mut self) {
         let environment = !matches!(self.environment, Environment::None);
-        let emitting = self.materials_in_use().any(Material::is_emissive);
+        let lamp = |material: &Material| material.is_emissive() && material.emission_texture.is_none();
+        let emitting = self.materials_in_use().any(lamp);
         let shaded = self.materials_in_use().any(|material| material.bsdf != Bsdf::Unlit);
         let unlit = !shaded && self.materials_in_use().next().is_some();
         if environment || emitting || unlit || !self.lights.is_empty() {
             return;
         }
         self.environment = Environment::Constant([1.0; 3]);
-        self.notes.push(String::from("the scene has no light: a white environment of radiance 1 was added"));
+        let glow = self.materials_in_use().any(Material::is_emissive);
+        let why = if glow { "no light but emission textures" } else { "no light" };
+        self.notes.push(format!(
+            "the scene has {why}: a white environment of radiance 1 was added (--env-strength changes it, 0 removes it)"
+        ));
     }
 }
 

@@ -57,8 +57,13 @@ impl Node {
 
     /// Half the surface area.
     pub(super) fn half_area(&self) -> f32 {
+        self.relative_half_area(1.0)
+    }
+
+    /// Half the surface area, lengths multiplied by `scale`.
+    pub(super) fn relative_half_area(&self, scale: f32) -> f32 {
         let bounds = self.bounds();
-        half_area((bounds.max - bounds.min).extend(0.0))
+        half_area(((bounds.max - bounds.min) * scale).extend(0.0))
     }
 }
 
@@ -66,7 +71,6 @@ impl Node {
 /// instead of split by cost. Stacks and recursion rely on it.
 pub const MAX_DEPTH: u32 = 64;
 
-const MAX_BINS: usize = 32;
 /// Subtrees smaller than this are built by one thread: its work outweighs a task switch by far.
 const PARALLEL_PRIMITIVES: usize = 4096;
 
@@ -140,10 +144,16 @@ fn build_subtree(primitives: &mut [Primitive], nodes: &mut [Node], extent: Exten
     // Invariant: depth + ⌈log₂ count⌉ ≤ MAX_DEPTH. A split by cost may spend a level without making the larger half
     // smaller than count − 1, so it needs one level to spare; halving keeps the sum.
     let may_split_by_cost = depth + ceil_log2(count) < MAX_DEPTH;
-    let split = if may_split_by_cost { best_split(primitives, &extent) } else { None };
-    let (middle, left_extent, right_extent) = match split {
-        Some(split) => partition(primitives, &split),
-        None => halve(primitives, &extent),
+    let (middle, left_extent, right_extent) = if !may_split_by_cost {
+        halve(primitives, &extent)
+    } else {
+        match count {
+            2 => halves(primitives, 1),
+            3 => split_three(primitives),
+            4..16 => split_by_cost::<8>(primitives, &extent),
+            16..256 => split_by_cost::<16>(primitives, &extent),
+            _ => split_by_cost::<32>(primitives, &extent),
+        }
     };
     let left_nodes = 2 * middle - 1;
     node.right_or_primitive = 1 + left_nodes as u32;
@@ -180,6 +190,12 @@ impl Binning {
         let position = (primitive.centroid() - self.origin) * self.scale;
         [position.x, position.y, position.z].map(|x| (x as u32).min(self.last) as usize)
     }
+
+    /// The same on one axis.
+    #[inline]
+    fn bin(&self, primitive: &Primitive, axis: usize) -> usize {
+        self.bins(primitive)[axis]
+    }
 }
 
 struct Split {
@@ -207,12 +223,11 @@ impl Bin {
     }
 }
 
-/// The cheapest split between bins, or `None` if all centroids are the same point.
-fn best_split(primitives: &[Primitive], extent: &Extent) -> Option<Split> {
-    let bins = (4 + primitives.len() / 4).min(MAX_BINS);
-    let binning = Binning::new(extent, bins);
-    let mut table = [[Bin::EMPTY; MAX_BINS]; 3];
-    for primitive in primitives {
+/// Splits between `BINS` bins where it costs least, or in halves if all centroids are the same point.
+fn split_by_cost<const BINS: usize>(primitives: &mut [Primitive], extent: &Extent) -> (usize, Extent, Extent) {
+    let binning = Binning::new(extent, BINS);
+    let mut table = [[Bin::EMPTY; BINS]; 3];
+    for primitive in primitives.iter() {
         let indices = binning.bins(primitive);
         for (axis, &index) in indices.iter().enumerate() {
             table[axis][index].add(&Bin { min: primitive.min, max: primitive.max, count: 1 });
@@ -222,23 +237,26 @@ fn best_split(primitives: &[Primitive], extent: &Extent) -> Option<Split> {
     let size = extent.max - extent.min;
     let relative = 1.0 / size.x.max(size.y).max(size.z).max(f32::MIN_POSITIVE);
     let mut best: Option<(f32, Split)> = None;
-    for (axis, bins_of_axis) in table.iter().enumerate() {
+    for (axis, bins) in table.iter().enumerate() {
         if extent.centroid_min[axis] >= extent.centroid_max[axis] {
             continue;
         }
-        let (cost, bin) = sweep(&bins_of_axis[..bins], relative);
+        let (cost, bin) = sweep(bins, relative);
         if best.as_ref().is_none_or(|(least, _)| cost < *least) {
             best = Some((cost, Split { binning, axis, bin }));
         }
     }
-    best.map(|(_, split)| split)
+    match best {
+        Some((_, split)) => partition(primitives, &split),
+        None => halve(primitives, extent),
+    }
 }
 
 /// Least cost Σ area · count over the splits of an axis whose first and last bins are occupied, and its right part's
 /// first bin.
-fn sweep(bins: &[Bin], relative: f32) -> (f32, usize) {
+fn sweep<const BINS: usize>(bins: &[Bin; BINS], relative: f32) -> (f32, usize) {
     let cost = |bin: &Bin| half_area((bin.max - bin.min) * relative) * bin.count as f32;
-    let mut right_costs = [0.0; MAX_BINS];
+    let mut right_costs = [0.0; BINS];
     let mut right = Bin::EMPTY;
     for (index, bin) in bins.iter().enumerate().skip(1).rev() {
         right.add(bin);
@@ -246,7 +264,7 @@ fn sweep(bins: &[Bin], relative: f32) -> (f32, usize) {
     }
     let mut best = (f32::INFINITY, 1);
     let mut left = Bin::EMPTY;
-    for index in 1..bins.len() {
+    for index in 1..BINS {
         left.add(&bins[index - 1]);
         let total = cost(&left) + right_costs[index];
         if total < best.0 {
@@ -256,13 +274,27 @@ fn sweep(bins: &[Bin], relative: f32) -> (f32, usize) {
     best
 }
 
+/// The exact best of the three ways to split three: the pair of least area stays together.
+fn split_three(primitives: &mut [Primitive]) -> (usize, Extent, Extent) {
+    let pair_area = |a: &Primitive, b: &Primitive| half_area(a.max.max(b.max) - a.min.min(b.min));
+    let single_area = |a: &Primitive| half_area(a.max - a.min);
+    let cost = |single: usize| {
+        let (a, b) = (&primitives[(single + 1) % 3], &primitives[(single + 2) % 3]);
+        2.0 * pair_area(a, b) + single_area(&primitives[single])
+    };
+    let costs = [cost(0), cost(1), cost(2)];
+    let single = (1..3).fold(0, |best, k| if costs[k] < costs[best] { k } else { best });
+    primitives.swap(single, 0);
+    halves(primitives, 1)
+}
+
 /// Moves the primitives of the left bins to the front; returns how many, and both extents.
 fn partition(primitives: &mut [Primitive], split: &Split) -> (usize, Extent, Extent) {
     let (mut left, mut right) = (Extent::EMPTY, Extent::EMPTY);
     let (mut front, mut back) = (0, primitives.len());
     while front < back {
         let primitive = primitives[front];
-        if split.binning.bins(&primitive)[split.axis] < split.bin {
+        if split.binning.bin(&primitive, split.axis) < split.bin {
             left.add(&primitive);
             front += 1;
         } else {
@@ -282,6 +314,11 @@ fn halve(primitives: &mut [Primitive], extent: &Extent) -> (usize, Extent, Exten
         let axis = size.xyz().max_position();
         primitives.select_nth_unstable_by(middle, |a, b| a.centroid()[axis].total_cmp(&b.centroid()[axis]));
     }
+    halves(primitives, middle)
+}
+
+/// The first `middle` and the rest.
+fn halves(primitives: &[Primitive], middle: usize) -> (usize, Extent, Extent) {
     let (left, right) = primitives.split_at(middle);
     (middle, Extent::of(left), Extent::of(right))
 }

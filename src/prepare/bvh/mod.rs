@@ -1,6 +1,7 @@
 //! The bounding volume hierarchy that the shader traverses: built binary, collapsed to four children a node, quantised.
 
 mod binary;
+mod collapse;
 mod quantise;
 mod validate;
 mod wide;

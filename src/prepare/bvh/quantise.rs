@@ -5,7 +5,7 @@ use crate::layout::InnerSlot;
 use crate::prepare::bounds::Bounds;
 
 const EXPONENT_BIAS: i32 = 127;
-const GRID_STEPS: f64 = 255.0;
+const GRID_STEPS: u32 = 255;
 
 /// An inner slot with up to four children. `kind` is zero, the absent children have lower 255 and upper 0.
 pub fn inner_slot(children: &[Bounds], child_group: u32) -> InnerSlot {
@@ -16,7 +16,7 @@ pub fn inner_slot(children: &[Bounds], child_group: u32) -> InnerSlot {
         let exponent = step_exponent(origin, end);
         slot.origin[axis] = origin;
         slot.exponents |= ((exponent + EXPONENT_BIAS) as u32) << (8 * axis);
-        let grid = Grid { origin: f64::from(origin), step: 2f64.powi(exponent) };
+        let grid = Grid { origin: f64::from(origin), step: power_of_two(exponent), per_step: power_of_two(-exponent) };
         for (index, child) in children.iter().enumerate() {
             let shift = 8 * index;
             slot.lower[axis] &= !(0xff << shift);
@@ -29,7 +29,7 @@ pub fn inner_slot(children: &[Bounds], child_group: u32) -> InnerSlot {
 
 /// The exact corners (lower, upper) of child `index` on `axis` as (origin, offset) pairs: the corner is their sum.
 pub fn decode(slot: &InnerSlot, index: usize, axis: usize) -> [(f64, f64); 2] {
-    let step = 2f64.powi(((slot.exponents >> (8 * axis)) & 0xff) as i32 - EXPONENT_BIAS);
+    let step = power_of_two(((slot.exponents >> (8 * axis)) & 0xff) as i32 - EXPONENT_BIAS);
     [slot.lower, slot.upper].map(|words| {
         let steps = (words[axis] >> (8 * index)) & 0xff;
         (f64::from(slot.origin[axis]), f64::from(steps) * step)
@@ -61,13 +61,18 @@ fn step_exponent(origin: f32, end: f32) -> i32 {
     let mut exponent = spacing;
     if size > 0.0 {
         // 2^⌊log₂(size/255)⌋ or one more; the estimate starts one low and the exact test decides.
-        let ratio = size / GRID_STEPS;
+        let ratio = size / f64::from(GRID_STEPS);
         exponent = exponent.max(((ratio.to_bits() >> 52) & 0x7ff) as i32 - 1023 - 1);
     }
-    while compare_sum(f64::from(origin), GRID_STEPS * 2f64.powi(exponent), f64::from(end)).is_lt() {
+    while compare_sum(f64::from(origin), f64::from(GRID_STEPS) * power_of_two(exponent), f64::from(end)).is_lt() {
         exponent += 1;
     }
     exponent
+}
+
+/// 2^exponent for an exponent of a normal f64.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
 }
 
 fn exponent_of(x: f32) -> i32 {
@@ -77,28 +82,35 @@ fn exponent_of(x: f32) -> i32 {
 struct Grid {
     origin: f64,
     step: f64,
+    /// 1/step, exact.
+    per_step: f64,
 }
 
 impl Grid {
-    fn compare(&self, steps: f64, coordinate: f32) -> std::cmp::Ordering {
-        compare_sum(self.origin, steps * self.step, f64::from(coordinate))
+    fn compare(&self, steps: u32, coordinate: f32) -> std::cmp::Ordering {
+        compare_sum(self.origin, f64::from(steps) * self.step, f64::from(coordinate))
+    }
+
+    /// Whole steps to the coordinate, up to the rounding of the difference.
+    fn near(&self, coordinate: f32) -> u32 {
+        (((f64::from(coordinate) - self.origin) * self.per_step) as u32).min(GRID_STEPS)
     }
 
     /// The last grid line not above the coordinate.
     fn below(&self, coordinate: f32) -> u32 {
-        let mut steps = ((f64::from(coordinate) - self.origin) / self.step).floor().clamp(0.0, GRID_STEPS);
-        while steps > 0.0 && self.compare(steps, coordinate).is_gt() {
-            steps -= 1.0;
+        let mut steps = self.near(coordinate);
+        while steps > 0 && self.compare(steps, coordinate).is_gt() {
+            steps -= 1;
         }
-        steps as u32
+        steps
     }
 
     /// The first grid line not below the coordinate.
     fn above(&self, coordinate: f32) -> u32 {
-        let mut steps = ((f64::from(coordinate) - self.origin) / self.step).ceil().clamp(0.0, GRID_STEPS);
+        let mut steps = self.near(coordinate);
         while steps < GRID_STEPS && self.compare(steps, coordinate).is_lt() {
-            steps += 1.0;
+            steps += 1;
         }
-        steps as u32
+        steps
     }
 }

@@ -3,6 +3,7 @@
 use bytemuck::Zeroable;
 
 use super::binary::Node;
+use super::collapse::{choose, wide_children};
 use super::quantise::inner_slot;
 use crate::layout::{LeafSlot, SLOT_GROUP, SLOT_LEAF, Texel};
 use crate::prepare::PrepareError;
@@ -44,6 +45,7 @@ pub(super) fn append(
     nodes: &[Node],
     mut leaf: impl FnMut(u32, u32) -> Slot,
 ) -> Result<Appended, PrepareError> {
+    let choices = choose(nodes);
     let root = allocate_group(slots)? * SLOT_GROUP;
     // Inner nodes whose slot is allocated but not written yet.
     let mut pending = vec![(0u32, root, 1u32)];
@@ -53,7 +55,7 @@ pub(super) fn append(
     while let Some((node, slot, depth)) = pending.pop() {
         appended.inner_slots += 1;
         appended.depth = appended.depth.max(depth);
-        let (children, count) = children(nodes, node);
+        let (children, count) = wide_children(nodes, &choices, node);
         let children = &children[..count];
         let group = allocate_group(slots)?;
         let mut boxes = [Bounds::EMPTY; SLOT_GROUP as usize];
@@ -83,29 +85,4 @@ fn allocate_group(slots: &mut Vec<Slot>) -> Result<u32, PrepareError> {
     }
     slots.resize(slots.len() + SLOT_GROUP as usize, empty_slot());
     Ok(group as u32)
-}
-
-/// Up to four nodes that stand for `node`: its children, the one of the largest area replaced by its own children
-/// while there is room.
-fn children(nodes: &[Node], node: u32) -> ([u32; 4], usize) {
-    let mut children = [0; 4];
-    let Some(root) = nodes.get(node as usize) else { return (children, 0) };
-    if root.is_leaf() {
-        children[0] = node;
-        return (children, 1);
-    }
-    children[..2].copy_from_slice(&[node + 1, node + root.right_or_primitive]);
-    let mut count = 2;
-    while count < 4 {
-        let largest = (0..count).filter(|&index| !nodes[children[index] as usize].is_leaf()).max_by(|&a, &b| {
-            let (a, b) = (&nodes[children[a] as usize], &nodes[children[b] as usize]);
-            a.half_area().total_cmp(&b.half_area()).then(a.leaves.cmp(&b.leaves))
-        });
-        let Some(largest) = largest else { break };
-        let opened = children[largest];
-        children[largest] = opened + 1;
-        children[count] = opened + nodes[opened as usize].right_or_primitive;
-        count += 1;
-    }
-    (children, count)
 }

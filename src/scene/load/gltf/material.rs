@@ -143,7 +143,8 @@ impl Loader<'_> {
         let volume_was_named = self.warnings.has("KHR_materials_volume ");
         for name in place.extension_names()? {
             let known = super::SUPPORTED.contains(&name.as_str()) || super::INVISIBLE.contains(&name.as_str());
-            if !known && !(volume_was_named && name == "KHR_materials_volume") {
+            let said = volume_was_named && name == "KHR_materials_volume";
+            if !known && !said {
                 let subject = format!("{name} is not supported yet: what it describes is ignored");
                 self.warnings.add(subject, &place.pointer);
             }

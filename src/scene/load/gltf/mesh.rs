@@ -103,11 +103,7 @@ impl Loader<'_> {
         if !place.list("targets")?.is_empty() {
             self.warnings.add("morph targets are not supported yet: meshes are shown unmorphed", &place.pointer);
         }
-        // Draco is no loss where it is not required: the plain accessors are there too.
-        let extensions = place.extension_names()?;
-        if extensions.iter().any(|name| !["KHR_draco_mesh_compression"].contains(&name.as_str())) {
-            self.warn_of_extensions(place)?;
-        }
+        self.warn_of_extensions(place)?;
         Ok(())
     }
 

@@ -3,7 +3,8 @@
 //! The document is read as JSON values that know their place (`json.rs`), and only what a ray can meet is read at all:
 //! the nodes of one scene, the meshes, materials and textures they use, and of the buffers what those need.
 //!
-//! - The default scene, else the first, else all root nodes. Nodes form strict trees, as the specification demands.
+//! - The default scene, else the first, else all root nodes. A node with several parents is shown below each;
+//!   cycles are refused.
 //! - Triangles, strips and fans; points and lines have no surface and are skipped with a warning.
 //! - Extensions: KHR_lights_punctual (a light's `range` is ignored: light falls off by the square of the distance, to
 //!   infinity), KHR_materials_emissive_strength, _ior, _unlit, _transmission (thin-walled), KHR_mesh_quantization,
@@ -45,9 +46,18 @@ const SUPPORTED: &[&str] = &[
     "EXT_texture_webp",
 ];
 
-/// What may be ignored without a word: it cannot change the picture.
-const INVISIBLE: &[&str] =
-    &["KHR_xmp", "KHR_xmp_json_ld", "EXT_structural_metadata", "EXT_mesh_features", "FB_ngon_encoding"];
+/// What may be ignored without a word: it does not change the picture, or it is a compressed copy of what is read plainly
+/// (a file that has nothing else must require it).
+const INVISIBLE: &[&str] = &[
+    "EXT_mesh_features",
+    "EXT_meshopt_compression",
+    "EXT_structural_metadata",
+    "FB_ngon_encoding",
+    "KHR_draco_mesh_compression",
+    "KHR_meshopt_compression",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+];
 
 /// The state of one load.
 struct Loader<'a> {

@@ -8,6 +8,10 @@ use super::Loader;
 use super::json::Json;
 use crate::scene::{Instance, SceneResult};
 
+/// How often nodes may be shown again below a further parent: a few nodes, each twice below the one before, would
+/// unfold to any number.
+const MAX_REPEATS: usize = 1 << 18;
+
 impl Loader<'_> {
     /// Walks the nodes of the scene to show, and loads what they hold.
     pub(super) fn load_nodes(&mut self) -> SceneResult<()> {
@@ -23,39 +27,41 @@ impl Loader<'_> {
             }
             None => root_nodes(&root)?,
         };
-        self.walk(roots)
+        let mut listed = HashSet::new();
+        self.walk(roots.into_iter().filter(|(index, _)| listed.insert(*index)).collect())
     }
 
-    /// Visits every node once, parents before children. An explicit stack: files can nest deeper than ours.
+    /// Visits the nodes, parents before children. The specification wants trees; where a node has several parents it is
+    /// shown below each. An explicit stack: files can nest deeper than ours.
     fn walk<'b>(&mut self, roots: Vec<(usize, Json<'b>)>) -> SceneResult<()> {
-        let mut parents: HashMap<usize, Option<usize>> = HashMap::new();
-        let mut stack: Vec<(usize, Json<'b>, Option<usize>, DAffine3)> =
-            roots.into_iter().rev().map(|(index, node)| (index, node, None, DAffine3::IDENTITY)).collect();
-        while let Some((index, node, parent, parent_to_world)) = stack.pop() {
-            if parents.insert(index, parent).is_some() {
-                return Err(node
-                    .fail(visited_twice(index, parent, &parents))
-                    .hint("nodes must form trees: export the file again, or duplicate the node"));
+        let (shared, count) = check_hierarchy(&roots)?;
+        let mut visits = 0;
+        let mut stack: Vec<(usize, Json<'b>, DAffine3)> =
+            roots.into_iter().rev().map(|(index, node)| (index, node, DAffine3::IDENTITY)).collect();
+        while let Some((index, node, parent_to_world)) = stack.pop() {
+            visits += 1;
+            if visits > count + MAX_REPEATS {
+                let message = format!("nodes with several parents unfold to more than {MAX_REPEATS} further ones");
+                return Err(node.fail(message).hint("instance the mesh by plain nodes instead"));
             }
-            let local = local_transform(&node)?;
-            let to_world = parent_to_world * local;
+            if shared.contains(&index) {
+                self.warnings.add("nodes with several parents are shown below each of them", &node.pointer);
+            }
+            let to_world = parent_to_world * local_transform(&node)?;
             if !to_world.is_finite() {
                 return Err(node.fail("the node's world transform is not finite"));
             }
             self.load_node(index, &node, to_world)?;
             for child in node.list("children")?.into_iter().rev() {
                 let (child_index, child) = child.refer("nodes")?;
-                stack.push((child_index, child, Some(index), to_world));
+                stack.push((child_index, child, to_world));
             }
         }
         Ok(())
     }
 
     fn load_node(&mut self, index: usize, node: &Json<'_>, to_world: DAffine3) -> SceneResult<()> {
-        let supported_here = ["KHR_lights_punctual"];
-        if node.extension_names()?.iter().any(|name| !supported_here.contains(&name.as_str())) {
-            self.warn_of_extensions(node)?;
-        }
+        self.warn_of_extensions(node)?;
         if let Some((mesh_index, mesh)) = node.refer_by("mesh", "meshes")? {
             if node.get("skin")?.is_some() {
                 self.warnings.add("skins are not supported yet: meshes are shown in their bind pose", &node.pointer);
@@ -88,21 +94,56 @@ fn root_nodes<'a>(root: &Json<'a>) -> SceneResult<Vec<(usize, Json<'a>)>> {
     Ok(nodes.into_iter().enumerate().filter(|(index, _)| !children.contains(index)).collect())
 }
 
-/// What is wrong when `index` is reached again, this time from `parent`, which has been visited.
-fn visited_twice(index: usize, parent: Option<usize>, parents: &HashMap<usize, Option<usize>>) -> String {
-    let Some(parent) = parent else {
-        return format!("node {index} is listed as a root of the scene, but is also reached otherwise");
-    };
-    // `parents` now maps `index` to `parent`: on a cycle the way up from there comes back to `index`.
-    let mut ancestor = Some(parent);
-    for _ in 0..parents.len() {
-        match ancestor {
-            Some(node) if node == index => return format!("the nodes form a cycle: node {index} is below itself"),
-            Some(node) => ancestor = parents.get(&node).copied().flatten(),
-            None => break,
+/// Refuses cycles, and roots that are also below another node (they would be shown twice in one place). Returns the
+/// nodes with several parents, and the number of nodes.
+fn check_hierarchy(roots: &[(usize, Json<'_>)]) -> SceneResult<(HashSet<usize>, usize)> {
+    #[derive(PartialEq)]
+    enum State {
+        Open,
+        Done,
+    }
+    enum Step<'a> {
+        Enter(usize, Json<'a>),
+        Leave(usize),
+    }
+    const HINT: &str = "nodes must form trees: export the file again";
+    let root_indices: HashSet<usize> = roots.iter().map(|(index, _)| *index).collect();
+    let mut states: HashMap<usize, State> = HashMap::new();
+    let mut shared = HashSet::new();
+    let mut stack: Vec<Step<'_>> = roots.iter().map(|(index, node)| Step::Enter(*index, node.clone())).collect();
+    while let Some(step) = stack.pop() {
+        let (index, node) = match step {
+            Step::Enter(index, node) => (index, node),
+            Step::Leave(index) => {
+                states.insert(index, State::Done);
+                continue;
+            }
+        };
+        match states.insert(index, State::Open) {
+            None => {}
+            Some(State::Open) => {
+                return Err(node.fail(format!("the nodes form a cycle: node {index} is below itself")).hint(HINT));
+            }
+            Some(State::Done) => {
+                states.insert(index, State::Done);
+                shared.insert(index);
+                continue;
+            }
+        }
+        stack.push(Step::Leave(index));
+        for child in node.list("children")? {
+            let (child_index, child_node) = child.refer("nodes")?;
+            if root_indices.contains(&child_index)
+                && child_index != index
+                && states.get(&child_index) != Some(&State::Open)
+            {
+                let message = format!("node {child_index} is a root of the scene and also a child of node {index}");
+                return Err(child.fail(message).hint(HINT));
+            }
+            stack.push(Step::Enter(child_index, child_node));
         }
     }
-    format!("node {index} has several parents, one of them node {parent}")
+    Ok((shared, states.len()))
 }
 
 /// A node's own transform: `matrix`, or translation · rotation · scale.

@@ -42,6 +42,9 @@ fn unknown_format(bytes: &[u8]) -> String {
     if bytes.is_empty() {
         return String::from("the image is empty");
     }
+    if bytes.starts_with(b"\xabKTX") {
+        return String::from("KTX images are not supported; use PNG, JPEG or WebP");
+    }
     String::from("the image is of no known format; use PNG, JPEG or WebP")
 }
 

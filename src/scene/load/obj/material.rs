@@ -132,9 +132,8 @@ impl Place<'_> {
             let (greatest, only_numbers) = match option {
                 "-s" | "-o" | "-t" => (3, true),
                 "-mm" => (2, true),
-                "-bm" | "-boost" | "-texres" | "-blendu" | "-blendv" | "-cc" | "-clamp" | "-imfchan" | "-type" => {
-                    (1, false)
-                }
+                "-bm" | "-boost" | "-texres" | "-blendu" | "-blendv" | "-cc" | "-clamp" | "-imfchan" | "-type"
+                | "-colorspace" => (1, false),
                 // Not an option: a file name that begins with a dash.
                 _ => break,
             };
@@ -149,7 +148,7 @@ impl Place<'_> {
                 }
                 rest = after;
             }
-            if !matches!(option, "-clamp" | "-blendu" | "-blendv") {
+            if !matches!(option, "-clamp" | "-blendu" | "-blendv" | "-cc" | "-texres" | "-type") {
                 let subject = format!("texture option {option} is not supported and ignored");
                 warnings.add(subject, format!("{} line {}", self.path.display(), self.line));
             }

@@ -20,6 +20,7 @@ pub(super) struct Face {
     pub(super) corners: Vec<Corner>,
     /// Index into [`Geometry::material_names`].
     pub(super) material: Option<u32>,
+    line: usize,
 }
 
 /// What an OBJ file holds.
@@ -42,6 +43,7 @@ pub(super) fn parse(path: &Path, text: &str, warnings: &mut Warnings) -> SceneRe
     for (line, content) in logical_lines(text) {
         parser.line(line, &content)?;
     }
+    parser.check_indices()?;
     Ok(parser.geometry)
 }
 
@@ -159,7 +161,7 @@ impl Parser<'_> {
                 Ok(())
             }
             _ => {
-                self.geometry.faces.push(Face { corners, material: self.material });
+                self.geometry.faces.push(Face { corners, material: self.material, line });
                 Ok(())
             }
         }
@@ -185,15 +187,47 @@ impl Parser<'_> {
         })
     }
 
-    /// Indices count from 1; negative ones count back from the last element so far.
+    /// Indices count from 1; negative ones count back from the last element so far. Positive ones may point forwards, so
+    /// their upper bound is checked at the end.
     fn index(&self, line: usize, text: &str, count: usize, what: &str) -> SceneResult<u32> {
         let number: i64 = text.parse().map_err(|_| self.fail(line, format!("\"{text}\" is no {what} index")))?;
         let index = if number < 0 { number.checked_add(count as i64) } else { number.checked_sub(1) };
-        index
-            .filter(|&index| (0..count as i64).contains(&index))
-            .and_then(|index| u32::try_from(index).ok())
-            .ok_or_else(|| {
-                self.fail(line, format!("{what} index {number} is out of range: {count} were defined before this line"))
-            })
+        index.and_then(|index| u32::try_from(index).ok()).ok_or_else(|| {
+            let message = format!("{what} index {number} is out of range: {count} were defined before this line");
+            self.fail(line, message)
+        })
+    }
+
+    /// Every index must be in range. Where the file defines no normals or no texture coordinates at all, the faces that
+    /// refer to some are read as if they did not.
+    fn check_indices(&mut self) -> SceneResult<()> {
+        let mut faces = std::mem::take(&mut self.geometry.faces);
+        let (positions, normals) = (self.geometry.positions.len(), self.geometry.normals.len());
+        let texcoords = self.geometry.texcoords.len();
+        for face in &mut faces {
+            for corner in &mut face.corners {
+                self.in_range(face.line, "vertex", Some(corner.position), positions)?;
+                if normals == 0 && corner.normal.take().is_some() {
+                    self.warn("faces refer to normals, but there are none: they are flat", face.line);
+                }
+                if texcoords == 0 && corner.texcoord.take().is_some() {
+                    self.warn("faces refer to texture coordinates, but there are none", face.line);
+                }
+                self.in_range(face.line, "normal", corner.normal, normals)?;
+                self.in_range(face.line, "texture coordinate", corner.texcoord, texcoords)?;
+            }
+        }
+        self.geometry.faces = faces;
+        Ok(())
+    }
+
+    fn in_range(&self, line: usize, what: &str, index: Option<u32>, count: usize) -> SceneResult<()> {
+        match index {
+            Some(index) if index as usize >= count => {
+                let number = u64::from(index) + 1;
+                Err(self.fail(line, format!("{what} index {number} is out of range: the file has {count}")))
+            }
+            _ => Ok(()),
+        }
     }
 }

@@ -1,0 +1,154 @@
+//! The environment's CDFs: normalised, no positive lookup without a positive density, unbiased.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use crate::prepare_support::Random;
+use glam::DVec3;
+use sunfleck::layout::CDF_TOTAL;
+use sunfleck::prepare::EnvironmentSampling::{Importance, Uniform};
+use sunfleck::prepare::environment::{EnvironmentKind, PreparedEnvironment, direction_to_uv, prepare};
+use sunfleck::scene::Environment;
+
+fn image(width: u32, height: u32, rotation_radians: f64, texel: impl Fn(u32, u32) -> [f32; 3]) -> Environment {
+    let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+    Environment::Image { name: "test".into(), width, height, texels: Arc::new(texels), strength: 2.0, rotation_radians }
+}
+
+fn luminance([r, g, b]: [f32; 3]) -> f64 {
+    0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
+}
+
+/// The lookup of the shader: bilinear, u wraps, v clamps, texel centres at (i + ½)/n.
+fn lookup(environment: &PreparedEnvironment, u: f64, v: f64) -> f64 {
+    let (width, height) = (environment.width as i64, environment.height as i64);
+    let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
+    let (x0, y0) = (x.floor(), y.floor());
+    let (fx, fy) = (x - x0, y - y0);
+    let texel = |x: i64, y: i64| {
+        let texel = environment.array[(y.clamp(0, height - 1) * width + x.rem_euclid(width)) as usize];
+        luminance([texel[0], texel[1], texel[2]].map(f32::from_bits))
+    };
+    let (x0, y0) = (x0 as i64, y0 as i64);
+    let row = |y: i64| texel(x0, y) * (1.0 - fx) + texel(x0 + 1, y) * fx;
+    row(y0) * (1.0 - fy) + row(y0 + 1) * fy
+}
+
+fn direction(u: f64, v: f64) -> DVec3 {
+    let (sin_theta, cos_theta) = (v * PI).sin_cos();
+    let (sin_phi, cos_phi) = (u * TAU).sin_cos();
+    DVec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi)
+}
+
+/// ∫ f dω over the sphere by midpoints, with `per_texel`² points a texel.
+fn integrate(environment: &PreparedEnvironment, per_texel: u32, f: impl Fn(DVec3, f64, f64) -> f64) -> f64 {
+    let (columns, rows) = (environment.width * per_texel, environment.height * per_texel);
+    let mut sum = 0.0;
+    for j in 0..rows {
+        let v = (f64::from(j) + 0.5) / f64::from(rows);
+        for i in 0..columns {
+            let u = (f64::from(i) + 0.5) / f64::from(columns);
+            sum += f(direction(u, v), u, v) * (v * PI).sin();
+        }
+    }
+    sum * 2.0 * PI * PI / (f64::from(columns) * f64::from(rows))
+}
+
+fn check(environment: &Environment) -> PreparedEnvironment {
+    let prepared = prepare(environment, Importance).unwrap();
+    assert_eq!(prepared.kind, EnvironmentKind::Image);
+    let (width, height) = (prepared.width as usize, prepared.height as usize);
+    let words = prepared.array.as_flattened();
+    let marginal = &words[prepared.marginal_word as usize..][..height + 1];
+    assert_eq!((marginal[0], marginal[height]), (0, CDF_TOTAL));
+    for y in 0..height {
+        let row = &words[prepared.conditional_word as usize + y * (width + 1)..][..width + 1];
+        let picked = marginal[y + 1] > marginal[y];
+        assert_eq!((row[0], row[width]), (0, if picked { CDF_TOTAL } else { 0 }));
+        assert!(row.is_sorted());
+    }
+    // The density integrates to 1: sin θ cancels, so the midpoint rule is exact within a cell.
+    let total = integrate(&prepared, 2, |direction, _, _| prepared.pdf_solid_angle(direction));
+    assert!((total - 1.0).abs() < 1e-9, "{total}");
+    // No direction that is bright is impossible.
+    let mut random = Random(9);
+    for _ in 0..20_000 {
+        let (u, v) = (random.unit(), random.unit());
+        let at = direction(u, v);
+        assert!(lookup(&prepared, u, v) == 0.0 || prepared.pdf_solid_angle(at) > 0.0, "({u}, {v})");
+    }
+    prepared
+}
+
+#[test]
+fn random_images_of_all_shapes() {
+    let mut random = Random(1);
+    for (width, height) in [(1, 1), (1, 7), (9, 1), (2, 2), (16, 8), (33, 17)] {
+        let values: Vec<f32> = (0..width * height).map(|_| random.unit().powi(4) as f32).collect();
+        check(&image(width, height, 0.0, |x, y| [values[(y * width + x) as usize], 0.5, 0.0]));
+        check(&image(width, height, 0.0, |x, y| [values[(y * width + x) as usize]; 3]));
+    }
+}
+
+#[test]
+fn mean_luminance_is_the_integral() {
+    let environment = image(16, 8, 0.0, |x, y| [(x * 3 + y * y) as f32; 3]);
+    let prepared = check(&environment);
+    let flux = 2.0 * integrate(&prepared, 32, |_, u, v| lookup(&prepared, u, v));
+    // A row's weight takes the lookup's mean over the cell before sin θ, which differs in second order of the row.
+    assert!((flux / (4.0 * PI) / prepared.mean_luminance - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn a_dim_texel_beside_a_blinding_one_is_not_lost() {
+    let prepared = check(&image(32, 16, 0.0, |x, y| match (x, y) {
+        (5, 6) => [1e9; 3],
+        (20, 10) => [1e-9; 3],
+        _ => [0.0; 3],
+    }));
+    assert!(prepared.texel_probability(20, 10) > 0.0);
+    assert!(prepared.texel_probability(19, 9) > 0.0, "bilinear lookups there are positive");
+    assert_eq!(prepared.texel_probability(18, 10), 0.0);
+    assert_eq!(prepared.texel_probability(20, 14), 0.0);
+}
+
+#[test]
+fn the_edge_column_leaks_around_u() {
+    let prepared = check(&image(8, 4, 0.0, |x, y| if (x, y) == (0, 0) { [1.0; 3] } else { [0.0; 3] }));
+    assert!(prepared.texel_probability(7, 0) > 0.0, "u wraps");
+    assert_eq!(prepared.texel_probability(0, 3), 0.0, "v does not");
+}
+
+#[test]
+fn density_follows_brightness() {
+    let prepared = check(&image(64, 32, 0.0, |x, _| if x < 32 { [3.0; 3] } else { [1.0; 3] }));
+    let [bright, dim] = [0.25, 0.75].map(|u| prepared.pdf_solid_angle(direction(u, 0.4)));
+    assert!((bright / dim - 3.0).abs() < 1e-6);
+}
+
+#[test]
+fn rotation_is_counter_clockwise_from_above() {
+    // The image's +X (u = 0) comes to stand at −Z when the environment turns by 90° counter-clockwise seen from above.
+    let (u, v) = direction_to_uv(DVec3::NEG_Z, PI / 2.0);
+    assert!((u.min(1.0 - u)).abs() < 1e-12 && (v - 0.5).abs() < 1e-12, "{u} {v}");
+    assert_eq!(direction_to_uv(DVec3::Z, 0.0).0, 0.25);
+    let turned = check(&image(8, 4, 0.0, |x, _| [x as f32; 3]));
+    let mut random = Random(4);
+    for _ in 0..100 {
+        let at = random.direction();
+        let (u, v) = direction_to_uv(at, 0.0);
+        assert!((direction(u, v) - at).length() < 1e-12);
+        assert!(turned.pdf_solid_angle(at).is_finite());
+    }
+}
+
+#[test]
+fn black_images_are_no_environment_and_constants_need_no_tables() {
+    let black = prepare(&image(4, 2, 0.0, |_, _| [0.0; 3]), Importance).unwrap();
+    assert_eq!((black.kind, black.array.len()), (EnvironmentKind::None, 0));
+    let white = prepare(&Environment::Constant([1.0; 3]), Importance).unwrap();
+    assert_eq!((white.kind, white.array.len()), (EnvironmentKind::Constant, 0));
+    assert!((white.pdf_solid_angle(DVec3::Y) - 0.25 / PI).abs() < 1e-15);
+    let uniform = prepare(&image(4, 2, 0.0, |_, _| [1.0; 3]), Uniform).unwrap();
+    assert_eq!((uniform.array.len(), uniform.conditional_word), (8, 0));
+}
