@@ -7,3 +7,4 @@ pub mod kernel;
 pub mod reference;
 pub mod scenes;
 pub mod statistics;
+pub mod trace;

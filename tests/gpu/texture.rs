@@ -1,8 +1,6 @@
 //! `sample_texture` against f64: wrap modes, filters, sRGB decoding and 16 bits, through the images and materials of a scene.
 
-mod common;
-
-use common::kernel::{Random, TestKernel, empty_scene, floats};
+use crate::common::kernel::{Random, TestKernel, empty_scene, floats};
 use glam::DAffine3;
 use sunfleck::prepare::srgb_to_linear;
 use sunfleck::scene::{

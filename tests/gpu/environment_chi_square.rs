@@ -1,13 +1,11 @@
 //! `environment_sample` draws from the density that `environment_pdf` states, for images of awkward sizes and brightness,
 //! rotated, and for uniform sampling; and it returns the radiance that `environment_radiance` has there.
 
-mod common;
-
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use common::kernel::{Random, TestKernel, empty_scene, floats, vector, vector_texel};
-use common::statistics::{ChiSquare, chi_square_test, sidak};
+use crate::common::kernel::{Random, TestKernel, empty_scene, floats, vector, vector_texel};
+use crate::common::statistics::{ChiSquare, chi_square_test, sidak};
 use glam::DVec3;
 use sunfleck::prepare::EnvironmentSampling;
 use sunfleck::prepare::environment::{PreparedEnvironment, prepare};

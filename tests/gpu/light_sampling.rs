@@ -1,13 +1,11 @@
 //! `sample_light`: lights are picked by their CDF, points are uniform on triangles, densities are those of the solid angle,
 //! and the light that arrives is what radiometry says: Lambert's formula for polygons, KHR_lights_punctual for the rest.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use common::kernel::{Random, TestKernel, empty_scene, floats, vector, vector_texel};
-use common::statistics::{Estimate, chi_square_test, normal_upper_tail, sidak};
+use crate::common::kernel::{Random, TestKernel, empty_scene, floats, vector, vector_texel};
+use crate::common::statistics::{Estimate, chi_square_test, normal_upper_tail, sidak};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use sunfleck::layout::{self, CDF_TOTAL, LeafSlot, NONE, SceneArray};
 use sunfleck::scene::{Environment, Instance, Material, Mesh, Primitive, PunctualKind, PunctualLight, Scene};
