@@ -25,7 +25,7 @@ struct Ray {
     float t_max;         // hits are at 0 < t < t_max
     bool any_hit;        // the first hit found ends the search
     TriangleId from;     // the triangle the ray starts on and
-    TriangleId towards;  // the one it aims at: planar, so neither can be hit again
+    TriangleId towards;  // the one it aims at, where t_max ends it: planar, so neither can be hit again
 };
 
 struct Hit {
