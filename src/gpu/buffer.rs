@@ -172,10 +172,10 @@ impl Drop for Buffer {
             }
             self.gpu.device.destroy_buffer(self.raw, None);
         }
-        if let Some(allocation) = self.allocation.take() {
-            if let Err(error) = self.gpu.allocator().free(allocation) {
-                tracing::error!("freeing {}: {error}", self.name);
-            }
+        if let Some(allocation) = self.allocation.take()
+            && let Err(error) = self.gpu.allocator().free(allocation)
+        {
+            tracing::error!("freeing {}: {error}", self.name);
         }
     }
 }
