@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the tests that touch a Vulkan device on every software driver in turn (`make test-drivers`), lavapipe 25 with
 # both trace back ends, and prints a table. Arguments go to `cargo test`, for example
-#   scripts/test-drivers.sh --test furnace
+#   scripts/test-drivers.sh --test gpu furnace
 # and SUNFLECK_DRIVERS="mesa-22 swiftshader" chooses the runs (names as in the table).
 set -euo pipefail
 
@@ -10,12 +10,8 @@ runs=${SUNFLECK_DRIVERS:-"mesa-22 mesa-25-bvh mesa-25-ray-query swiftshader"}
 
 scripts/drivers.sh
 
-# A test file touches a device if it uses the GPU fixture, renders or runs the program; the others need no repetition.
-if [ $# -eq 0 ]; then
-    for file in $(grep -lwE 'gpu|sunfleck::render|cargo_bin' tests/*.rs || true); do
-        set -- "$@" --test "$(basename "$file" .rs)"
-    done
-fi
+# These test binaries touch a device; the others need no repetition.
+[ $# -gt 0 ] || set -- --test gpu --test cli
 cargo test --quiet --no-run "$@"
 
 table=""

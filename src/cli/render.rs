@@ -161,6 +161,7 @@ mod tests {
         RenderResult {
             film,
             stopped_by: StopReason::Samples,
+            device_reason: String::new(),
             device: "a device".to_owned(),
             driver: "its driver".to_owned(),
             trace: "bvh".to_owned(),

@@ -1,11 +1,11 @@
 //! The delta lobes: mirror, refract, glass with both Fresnel terms, and metallic-roughness where it is smooth or thin.
 //! How often a lobe is chosen is a binomial test against Fresnel's equations in f64; where it goes is Snell's law in f64.
 
-mod common;
-
-use common::bsdf::{Configuration, MetallicRoughness, SCATTERED_DELTA, SCATTERED_THROUGH, Sample, direction, scatter};
-use common::kernel::TestKernel;
-use common::statistics::{binomial_two_sided, sidak};
+use crate::common::bsdf::{
+    Configuration, MetallicRoughness, SCATTERED_DELTA, SCATTERED_THROUGH, Sample, direction, scatter,
+};
+use crate::common::kernel::TestKernel;
+use crate::common::statistics::{binomial_two_sided, sidak};
 use glam::DVec3;
 use sunfleck::layout::{BSDF_GLASS, BSDF_MIRROR, BSDF_REFRACT};
 

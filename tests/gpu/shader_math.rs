@@ -1,8 +1,6 @@
 //! Elementary functions of shaders/include/math.glsl against f64.
 
-mod common;
-
-use common::gpu;
+use crate::common::gpu;
 
 #[test]
 fn polynomials_are_good_to_a_few_ulp() {

@@ -1,9 +1,7 @@
 //! The statistics that the other tests rely on, held against SciPy, and shown to reject what they must reject.
 
-mod common;
-
-use common::reference::{RESOLUTION, Reference, TILE};
-use common::statistics::{
+use crate::common::reference::{RESOLUTION, Reference, TILE};
+use crate::common::statistics::{
     Comparison, Estimate, TileStatistics, beta_regularised, binomial_two_sided, chi_square_test, chi_square_upper_tail,
     gamma_upper, ln_gamma, normal_cdf, normal_quantile, normal_upper_tail, sidak, student_two_sided,
 };

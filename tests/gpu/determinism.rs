@@ -1,11 +1,9 @@
 //! An image is a function of scene, settings, seed, sample range and kernel key alone.
 
-mod common;
-
 use std::ops::{ControlFlow, Range};
 
-use common::gpu;
-use common::scenes::scene;
+use crate::common::gpu;
+use crate::common::scenes::scene;
 use sunfleck::film::Film;
 use sunfleck::gpu::ArrayForm;
 use sunfleck::render::{BindingOverride, Integrator, PathTracer, Settings};

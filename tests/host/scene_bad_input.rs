@@ -1,12 +1,10 @@
 //! Broken input: every error names the file, the place and what is wrong, and nothing panics, hangs or takes memory that
 //! the file does not justify.
 
-mod scene_support;
-
 use std::path::Path;
 
+use crate::scene_support::*;
 use proptest::prelude::*;
-use scene_support::*;
 use serde_json::{Value, json};
 use sunfleck::scene::load::{load_environment, load_scene, resolve};
 

@@ -1,11 +1,9 @@
 //! The built-in Cornell box against Mitsuba's renderings of it (tests/reference/).
 
-mod common;
-
-use common::reference::{RESOLUTION, Reference, TILE};
-use common::scenes::{scene, short_form};
-use common::statistics::{Comparison, Estimate, TileStatistics};
-use common::{gpu, scenes};
+use crate::common::reference::{RESOLUTION, Reference, TILE};
+use crate::common::scenes::{scene, short_form};
+use crate::common::statistics::{Comparison, Estimate, TileStatistics};
+use crate::common::{gpu, scenes};
 use sunfleck::render::{Integrator, Settings};
 use sunfleck::scene::Scene;
 

@@ -1,12 +1,10 @@
 //! Estimators that must agree: the ways to look for light and to sample the environment, on every scene of the project.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::scenes::{all_scenes, scene, short_form};
-use common::statistics::Estimate;
-use common::{gpu, scenes};
+use crate::common::scenes::{all_scenes, scene, short_form};
+use crate::common::statistics::Estimate;
+use crate::common::{gpu, scenes};
 use sunfleck::render::{EnvSampling, LightSampling, MisHeuristic, Settings};
 use sunfleck::scene::{Environment, Scene};
 

@@ -1,11 +1,9 @@
 //! Every kernel compiles, and its SPIR-V is valid by `spirv-val` (Debian: spirv-tools; `make deps` installs it).
 
-mod common;
-
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use common::gpu;
+use crate::common::gpu;
 use sunfleck::gpu::{embedded, shader_compiler};
 
 /// `None` if the module is valid, else what the validator says.

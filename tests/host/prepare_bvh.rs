@@ -1,9 +1,7 @@
 //! The BVH: valid for every kind of input, and it finds the hits that brute force finds.
 
-mod prepare_support;
-
+use crate::prepare_support::*;
 use glam::{DAffine3, DVec3, Vec3};
-use prepare_support::*;
 use sunfleck::layout::{InnerSlot, LeafSlot, SLOT_LEAF};
 use sunfleck::prepare::bounds::Bounds;
 use sunfleck::prepare::bvh::{self, MAX_DEPTH, Primitive, Slot, Tree, decode, inner_slot, validate};

@@ -1,9 +1,7 @@
 //! Placement: rebasing, baking, mirrored and singular transforms, attributes, the camera.
 
-mod prepare_support;
-
+use crate::prepare_support::*;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
-use prepare_support::*;
 use sunfleck::layout::*;
 use sunfleck::prepare::{PrepareError, PrepareOptions, Prepared, camera_constants, prepare};
 use sunfleck::scene::{

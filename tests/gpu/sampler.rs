@@ -1,11 +1,9 @@
 //! The sampler of shaders/include/rng.glsl: every dimension is uniform, and dimensions, samples, pixels, bounces and seeds
 //! are independent of each other.
 
-mod common;
-
-use common::gpu;
-use common::kernel::{TestKernel, floats};
-use common::statistics::{chi_square_test, normal_upper_tail, sidak};
+use crate::common::gpu;
+use crate::common::kernel::{TestKernel, floats};
+use crate::common::statistics::{chi_square_test, normal_upper_tail, sidak};
 
 /// Level of each test here, all of its comparisons together.
 const ALPHA: f64 = 0.01;

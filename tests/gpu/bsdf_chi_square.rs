@@ -1,14 +1,12 @@
 //! `bsdf_scatter` draws from the density that `bsdf_pdf` states: χ² tests of the shaders' own functions over a grid of
 //! parameters, with bins narrow enough for the narrowest lobe. Delta lobes and absorption are cells of their own.
 
-mod common;
-
-use common::bsdf::{
+use crate::common::bsdf::{
     Configuration, HalfVectorBins, MetallicRoughness, Node, SCATTERED_THROUGH, Sample, Value, direction, evaluate,
     luminance, scatter,
 };
-use common::kernel::TestKernel;
-use common::statistics::{ChiSquare, chi_square_test, sidak};
+use crate::common::kernel::TestKernel;
+use crate::common::statistics::{ChiSquare, chi_square_test, sidak};
 use glam::DVec3;
 use sunfleck::layout::{BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS};
 

@@ -1,15 +1,13 @@
 //! src/layout.rs and shaders/include/layout.glsl are the same: blocks by reflection of the SPIR-V, records of the scene
 //! arrays by a kernel that decodes them, constants by the texts.
 
-mod common;
-
 use std::any::type_name_of_val;
 use std::collections::BTreeMap;
 use std::mem::offset_of;
 use std::path::Path;
 
-use common::gpu;
-use common::kernel::{Random, TestKernel, floats};
+use crate::common::gpu;
+use crate::common::kernel::{Random, TestKernel, floats};
 use spirq::ReflectConfig;
 use spirq::ty::{StructType, Type};
 use spirq::var::Variable;

@@ -1,8 +1,6 @@
 //! Valid OBJ and MTL: what is read, and what is warned of.
 
-mod scene_support;
-
-use scene_support::{Folder, png};
+use crate::scene_support::{Folder, png};
 use sunfleck::scene::load::load_scene;
 use sunfleck::scene::{Bsdf, Scene, Wrap};
 

@@ -1,9 +1,7 @@
 //! Valid glTF: what is read, and what is warned of.
 
-mod scene_support;
-
+use crate::scene_support::*;
 use glam::DVec3;
-use scene_support::*;
 use serde_json::{Value, json};
 use sunfleck::scene::load::{load_scene, resolve};
 use sunfleck::scene::{

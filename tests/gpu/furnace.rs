@@ -1,10 +1,8 @@
 //! Furnaces: scenes whose every pixel has a known radiance.
 
-mod common;
-
-use common::scenes::{scene, short_form};
-use common::statistics::{Comparison, Estimate};
-use common::{gpu, scenes};
+use crate::common::scenes::{scene, short_form};
+use crate::common::statistics::{Comparison, Estimate};
+use crate::common::{gpu, scenes};
 use sunfleck::render::{LightSampling, Settings};
 
 fn settings(size: u32, light_sampling: LightSampling) -> Settings {

@@ -1,12 +1,10 @@
 //! The environment's CDFs: normalised, no positive lookup without a positive density, unbiased.
 
-mod prepare_support;
-
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+use crate::prepare_support::Random;
 use glam::DVec3;
-use prepare_support::Random;
 use sunfleck::layout::CDF_TOTAL;
 use sunfleck::prepare::EnvironmentSampling::{Importance, Uniform};
 use sunfleck::prepare::environment::{EnvironmentKind, PreparedEnvironment, direction_to_uv, prepare};

@@ -1,11 +1,9 @@
 //! Lights: which there are, where they are, and how often each is picked.
 
-mod prepare_support;
-
 use std::f64::consts::PI;
 
+use crate::prepare_support::*;
 use glam::{DAffine3, DVec3};
-use prepare_support::*;
 use proptest::prelude::*;
 use sunfleck::layout::*;
 use sunfleck::prepare::{PrepareOptions, Prepared, cdf, prepare, spot_falloff, spot_solid_angle};

@@ -1,0 +1,4 @@
+//! Tests of the program as people call it.
+
+mod images;
+mod usage;

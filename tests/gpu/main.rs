@@ -1,0 +1,15 @@
+//! Tests that need a Vulkan device. They run on every driver (`make test-drivers`).
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod agreement;
+mod bsdf_chi_square;
+mod bsdf_delta;
+mod cornell;
+mod determinism;
+mod furnace;
+mod layout;
+mod sampler;
+mod shader_math;
+mod shaders_valid;

@@ -1,0 +1,19 @@
+//! Tests of what runs on the host: film, preparation, scenes, and the statistics that tests use.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod film_images;
+mod film_metrics;
+mod film_sums;
+mod prepare_bvh;
+mod prepare_environment;
+mod prepare_geometry;
+mod prepare_lights;
+mod prepare_support;
+mod scene_assets;
+mod scene_bad_input;
+mod scene_gltf;
+mod scene_obj;
+mod scene_support;
+mod statistics;
