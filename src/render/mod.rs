@@ -33,7 +33,7 @@ use crate::{Error, Result};
 /// Prepares a scene for a camera and the settings.
 ///
 /// # Errors
-/// [`Error::Usage`] if the scene does not fit the layout.
+/// [`Error::Prepare`] if the scene does not fit the layout.
 pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Prepared> {
     let options = PrepareOptions {
         camera: camera.camera_to_world.translation,
