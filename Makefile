@@ -15,7 +15,7 @@ build: deps ## builds the program, optimised
 demo: build ## renders scenes/cornell_spheres.gltf to out/demo.exr and out/demo.png
 	@mkdir -p out
 	cargo run --release --quiet -- render scenes/cornell_spheres.gltf -o out/demo.exr -o out/demo.png \
-		--resolution 512x512 --spp 64
+		--resolution 512x512 --spp 64 --exposure 1 --tonemap exponential
 	@ls -lh out/demo.exr out/demo.png
 
 test: deps ## builds and runs every test on the device of this machine

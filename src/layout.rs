@@ -1,5 +1,5 @@
 //! Every struct and constant that a shader reads or writes. The other half is `shaders/include/layout.glsl`;
-//! `tests/layout.rs` holds the two together.
+//! `tests/gpu/layout.rs` holds the two together.
 //!
 //! Scene data lies in a few arrays of 16-byte texels, which the shader reads through one accessor (`load4(array, index)`,
 //! see `shaders/include/arrays.glsl`) as texel buffer, storage buffer or device address. A struct here is a whole number

@@ -1,5 +1,5 @@
 // Every struct and constant shared with the host. The other half is src/layout.rs, where each field is documented;
-// tests/layout.rs holds the two together.
+// tests/gpu/layout.rs holds the two together.
 #ifndef LAYOUT_GLSL
 #define LAYOUT_GLSL
 

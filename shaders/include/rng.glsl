@@ -27,7 +27,7 @@ void pcg_mix(inout uvec4 v) {
 
 // The four-dimensional PCG hash of Jarzynski and Olano 2020, "Hash Functions for GPU Rendering", with a third round: after
 // their two, keys that differ in the upper half of one word alone (the y of a pixel) still make the lower half of the
-// result repeat itself (tests/sampler.rs).
+// result repeat itself (tests/gpu/sampler.rs).
 uvec4 pcg4d(uvec4 v) {
     v = v * 1664525u + 1013904223u;
     pcg_mix(v);

@@ -7,16 +7,17 @@ use sunfleck::film::exr::read_exr;
 use sunfleck::film::merge::merge;
 use sunfleck::film::output::{ImageFormat, check_writable};
 use sunfleck::film::png::{tone_map_srgb8, write_png};
-use sunfleck::film::tonemap::ToneMap;
 use sunfleck::{Error, Result};
 
 use super::print_warnings;
+use super::tone_args::ToneArgs;
 
 const EXAMPLES: &str = "\
 Example:
   sunfleck render scene.gltf --samples 0..64 -o a.exr
   sunfleck render scene.gltf --samples 64..128 -o b.exr
-  sunfleck merge a.exr b.exr -o image.exr              equals --spp 128 in one run, to 1 ulp";
+  sunfleck merge a.exr b.exr -o image.exr              equals --spp 128 in one run, to 1 ulp
+  sunfleck merge image.exr -o image.png --exposure 1   a picture of an image that is there already";
 
 /// Merge images of disjoint samples to the image of all of them, weighted by their sample counts.
 ///
@@ -27,9 +28,11 @@ pub(crate) struct MergeArgs {
     /// Images that `sunfleck render` wrote, of the same view.
     #[arg(required = true, value_name = "PART.exr")]
     parts: Vec<PathBuf>,
-    /// The image to write: .exr, or .png (clipped at radiance 1).
+    /// The image to write: .exr or .png.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    #[command(flatten)]
+    tone: ToneArgs,
 }
 
 /// Merges the parts.
@@ -44,7 +47,7 @@ pub(crate) fn run(args: &MergeArgs) -> anyhow::Result<()> {
         ImageFormat::Exr => image.write(&args.output)?,
         ImageFormat::Png => {
             let radiance = image.rgb().ok_or_else(|| Error::input(&args.output, "the merged image has no colours"))?;
-            let (pixels, _) = tone_map_srgb8(&radiance, 0.0, ToneMap::default());
+            let (pixels, _) = tone_map_srgb8(&radiance, args.tone.exposure, args.tone.tonemap);
             write_png(&args.output, image.width, image.height, &pixels)?;
         }
     }

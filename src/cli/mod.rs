@@ -13,6 +13,7 @@ mod progress;
 mod render;
 mod render_args;
 mod render_report;
+mod tone_args;
 mod watch;
 
 use std::io::{self, Write};

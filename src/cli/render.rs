@@ -11,7 +11,7 @@ use sunfleck::film::exr::ExrImage;
 use sunfleck::film::metadata::{Metadata, REC709_CHROMATICITIES, software};
 use sunfleck::film::output::ImageFormat;
 use sunfleck::film::png::{tone_map_srgb8, write_png};
-use sunfleck::render::{RenderResult, Settings, StopReason};
+use sunfleck::render::{RenderResult, Settings, StopReason, open_device, render_on};
 use sunfleck::scene::{Environment, Scene, load};
 
 use super::progress::Progress;
@@ -24,9 +24,13 @@ pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
     let loading = Instant::now();
     let scene = load_scene(&job)?;
     let load_seconds = loading.elapsed().as_secs_f64();
+    let device = open_device(&job.settings)?;
+    if !job.quiet {
+        eprintln!("device: {}, {}", device.reason, device.gpu.info.driver);
+    }
     interrupt::install();
     let mut progress = Progress::new(job.quiet);
-    let result = sunfleck::render::render(&scene, &job.settings, &mut |update| {
+    let result = render_on(&device, &scene, &job.settings, &mut |update| {
         progress.show(update);
         if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });

@@ -13,6 +13,7 @@ use sunfleck::render::{
 use sunfleck::{Error, Result};
 
 use super::parse;
+use super::tone_args::ToneArgs;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -41,12 +42,8 @@ pub(crate) struct RenderArgs {
     /// Camera of the scene, by name or index [default: the first].
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Image")]
     camera: Option<String>,
-    /// Exposure of .png outputs in steps: +1 doubles the brightness.
-    #[arg(long, value_name = "EV", default_value = "0", allow_hyphen_values = true, value_parser = parse::exposure_ev, help_heading = "Image")]
-    exposure: f32,
-    /// Tone curve of .png outputs: clip (min(L, 1)), exponential (1 - exp(-L)), reinhard (L / (1 + L)), aces.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = tone_map_parser(), hide_possible_values = true, help_heading = "Image")]
-    tonemap: ToneMap,
+    #[command(flatten)]
+    tone: ToneArgs,
     /// Pixel filter.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<PixelFilter>(PixelFilter::NAMES), help_heading = "Image")]
     pub(super) filter: PixelFilter,
@@ -132,19 +129,6 @@ pub(crate) struct RenderArgs {
     strict: bool,
 }
 
-fn tone_map_parser() -> impl clap::builder::TypedValueParser<Value = ToneMap> {
-    const NAMES: [&str; ToneMap::NAMES.len()] = {
-        let mut names = [""; ToneMap::NAMES.len()];
-        let mut i = 0;
-        while i < names.len() {
-            names[i] = ToneMap::NAMES[i].0;
-            i += 1;
-        }
-        names
-    };
-    parse::named(&NAMES)
-}
-
 /// A render with everything about it that is not the scene's.
 #[derive(Clone, Debug)]
 pub(crate) struct RenderJob {
@@ -215,8 +199,8 @@ impl RenderArgs {
                 strength: self.env_strength,
                 rotation_degrees: self.env_rotation,
             },
-            exposure_ev: self.exposure,
-            tone_map: self.tonemap,
+            exposure_ev: self.tone.exposure,
+            tone_map: self.tone.tonemap,
             json: self.json,
             quiet: self.quiet,
         })

@@ -17,6 +17,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "scene": job.scene,
         "device": result.device,
         "driver": result.driver,
+        "device_reason": result.device_reason,
         "trace": result.trace,
         "kernel_key": result.kernel_key,
         "features": result.features,
@@ -55,13 +56,12 @@ pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
         StopReason::Interrupted => "interrupted",
     };
     eprintln!(
-        "rendered {}x{} at {:.6} samples per pixel in {} ({why})",
+        "rendered {}x{} at {} samples per pixel in {} ({why})",
         film.width(),
         film.height(),
-        film.mean_samples_per_pixel(),
+        (1000.0 * film.mean_samples_per_pixel()).round() / 1000.0,
         time(result.seconds.render)
     );
-    eprintln!("  on {} ({}), trace {}", result.device, result.driver, result.trace);
     let seconds = result.seconds.render.max(1e-9);
     let rate = |count: u64| with_prefix(count as f64 / seconds);
     eprintln!("  {}paths/s, {}rays/s", rate(result.paths), rate(result.rays));

@@ -33,7 +33,7 @@ use crate::{Error, Result};
 /// Prepares a scene for a camera and the settings.
 ///
 /// # Errors
-/// [`Error::Usage`] if the scene does not fit the layout.
+/// [`Error::Prepare`] if the scene does not fit the layout.
 pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Prepared> {
     let options = PrepareOptions {
         camera: camera.camera_to_world.translation,
@@ -46,11 +46,24 @@ pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Res
     Ok(prepare::prepare(scene, &options)?)
 }
 
-/// Renders a scene. `progress` is called after every slice and may stop the run.
+/// Renders a scene on the device that the settings ask for. `progress` is called after every slice and may stop the run.
 ///
 /// # Errors
-/// No usable device, a camera that does not exist, a scene that does not fit, a lost device.
+/// No usable device, and those of [`render_on`].
 pub fn render(
+    scene: &Scene,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+) -> Result<RenderResult> {
+    render_on(&open_device(settings)?, scene, settings, progress)
+}
+
+/// Renders a scene on an open device.
+///
+/// # Errors
+/// A camera that does not exist, a scene that does not fit, a lost device.
+pub fn render_on(
+    open: &OpenDevice,
     scene: &Scene,
     settings: &Settings,
     progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
@@ -58,8 +71,6 @@ pub fn render(
     let camera_index = choose_camera(scene, settings.camera.as_deref())?;
     let camera =
         scene.cameras.get(camera_index).ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)))?;
-    let open = open_device(settings)?;
-    tracing::info!("{}", open.reason);
     let start = Instant::now();
     let prepared = prepare_scene(scene, camera, settings)?;
     let prepare_seconds = start.elapsed().as_secs_f64();
@@ -70,16 +81,13 @@ pub fn render(
         warnings
             .push(format!("{} samples had a path cut off at 65535 bounces: the image is too dark", run.capped_samples));
     }
-    for place in &run.first_non_finite {
-        warnings.push(format!("pixel ({}, {}), sample {} is NaN or infinite", place.x, place.y, place.sample));
-    }
     let aspect = f64::from(settings.width) / f64::from(settings.height);
     let key = tracer.key();
     Ok(RenderResult {
         stopped_by: run.stopped_by,
         device: open.gpu.info.name.clone(),
         driver: open.gpu.info.driver.clone(),
-        device_reason: open.reason,
+        device_reason: open.reason.clone(),
         trace: open.trace.to_string(),
         kernel_key: key.to_string(),
         features: key.features.kept().into_iter().map(str::to_owned).collect(),

@@ -35,7 +35,7 @@ pub fn open_device(settings: &Settings) -> Result<OpenDevice> {
     Ok(OpenDevice { gpu: Gpu::new(instance, info, requirements)?, trace, reason })
 }
 
-/// `auto` takes what is faster, not what exists: a CPU driver's ray query is slower than our BVH by 3 to 26 times (see
+/// `auto` takes what is faster, not what exists: a CPU driver's ray query is slower than our BVH by 4 to 26 times (see
 /// docs/benchmarks).
 pub fn choose_trace(info: &DeviceInfo, choice: TraceChoice) -> (TraceBackend, &'static str) {
     match choice {

@@ -1,5 +1,6 @@
 //! The path-tracing kernel for one scene on one device: built once, run for any seed and range of samples.
 
+use std::collections::VecDeque;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -150,49 +151,37 @@ impl PathTracer {
         self.constants.first_sample = samples.start;
         self.constants.end_sample = samples.end;
         self.constants_buffer.write(&[self.constants])?;
-        let pixels = padded_pixels(&self.constants);
-        let blocks = samples.start / BLOCK_SAMPLES..samples.end.div_ceil(BLOCK_SAMPLES);
-        let mut queue = SliceSizes::new(self.overrides, self.slices[0].lanes());
+        let mut schedule = Schedule::new(&self.constants);
+        let mut sizes = SliceSizes::new(self.overrides, self.slices[0].lanes());
         let mut run = Run::new(&self.constants);
-        let start = Instant::now();
-        let total_atoms = pixels * u64::from(blocks.end - blocks.start);
-        let total_samples =
-            u64::from(samples.end - samples.start) * u64::from(self.constants.width) * u64::from(self.constants.height);
-        let mut next_atom = 0;
-        let mut in_flight = std::collections::VecDeque::new();
+        let mut in_flight = VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
+        let start = Instant::now();
         loop {
-            let timed_out = time.is_some_and(|limit| start.elapsed() >= limit);
-            if timed_out && next_atom < total_atoms {
-                run.stopped_by = StopReason::Time;
+            if time.is_some_and(|limit| start.elapsed() >= limit) && !schedule.is_done() {
+                run.stop(StopReason::Time);
             }
-            while run.stopped_by == StopReason::Samples && next_atom < total_atoms {
+            while run.stopped_by == StopReason::Samples && !schedule.is_done() {
                 let Some(slot) = free.pop() else { break };
-                let lanes = queue.next_lanes().min(u32::try_from(total_atoms - next_atom).unwrap_or(u32::MAX));
-                let constants = SliceConstants {
-                    first_atom: u32::try_from(next_atom % pixels).unwrap_or(u32::MAX),
-                    lanes,
-                    first_block: blocks.start + u32::try_from(next_atom / pixels).unwrap_or(u32::MAX),
-                    ray_budget: queue.ray_budget(),
-                    ..SliceConstants::default()
-                };
+                let constants = schedule.next(sizes.next_lanes(), sizes.ray_budget());
                 self.slices[slot].submit(&self.kernel, slot, constants)?;
                 in_flight.push_back(slot);
-                next_atom += u64::from(lanes);
             }
+            // In the order of submission, so that a pixel's blocks are joined by their index.
             let Some(slot) = in_flight.pop_front() else { break };
             let outcome = self.slices[slot].finish(&self.kernel, slot)?;
-            queue.observe(&outcome);
+            sizes.observe(&outcome);
             run.add(&self.constants, &outcome, self.slices[slot].results(outcome.constants.lanes)?);
             free.push(slot);
             let update = ProgressUpdate {
                 samples_done: run.paths,
-                samples_total: (total_samples < u64::from(u32::MAX) << 8 || time.is_none()).then_some(total_samples),
+                // An open end is no total.
+                samples_total: (samples.end < u32::MAX).then(|| schedule.total_samples(&self.constants)),
                 elapsed: start.elapsed(),
                 time_limit: time,
             };
-            if progress(&update).is_break() && run.stopped_by == StopReason::Samples {
-                run.stopped_by = StopReason::Interrupted;
+            if progress(&update).is_break() {
+                run.stop(StopReason::Interrupted);
             }
         }
         run.seconds = start.elapsed().as_secs_f64();
@@ -205,7 +194,53 @@ impl PathTracer {
     }
 }
 
+/// Hands out the atoms of a run: block by block, each over all pixels.
+struct Schedule {
+    pixels: u64,
+    first_block: u32,
+    next_atom: u64,
+    atoms: u64,
+}
+
+impl Schedule {
+    fn new(constants: &RenderConstants) -> Self {
+        let pixels = padded_pixels(constants);
+        let first_block = constants.first_sample / BLOCK_SAMPLES;
+        let blocks = constants.end_sample.div_ceil(BLOCK_SAMPLES) - first_block;
+        Self { pixels, first_block, next_atom: 0, atoms: pixels * u64::from(blocks) }
+    }
+
+    fn is_done(&self) -> bool {
+        self.next_atom >= self.atoms
+    }
+
+    fn next(&mut self, lanes: u32, ray_budget: u32) -> SliceConstants {
+        let lanes = lanes.min(u32::try_from(self.atoms - self.next_atom).unwrap_or(u32::MAX));
+        let constants = SliceConstants {
+            first_atom: (self.next_atom % self.pixels) as u32,
+            lanes,
+            first_block: self.first_block + (self.next_atom / self.pixels) as u32,
+            ray_budget,
+            ..SliceConstants::default()
+        };
+        self.next_atom += u64::from(lanes);
+        constants
+    }
+
+    fn total_samples(&self, constants: &RenderConstants) -> u64 {
+        let samples = constants.end_sample - constants.first_sample;
+        u64::from(samples) * u64::from(constants.width) * u64::from(constants.height)
+    }
+}
+
 impl Run {
+    /// The first reason stays.
+    fn stop(&mut self, reason: StopReason) {
+        if self.stopped_by == StopReason::Samples {
+            self.stopped_by = reason;
+        }
+    }
+
     fn new(constants: &RenderConstants) -> Self {
         Self {
             film: Film::new(constants.width, constants.height),

@@ -10,7 +10,7 @@ use sunfleck::scene::{Environment, Scene};
 
 fn mean(scene: &Scene, settings: &Settings) -> [Estimate; 3] {
     let mut tracer = gpu::path_tracer(scene, settings);
-    scenes::seeds(&mut tracer, settings, if short_form() { 16 } else { 32 }, 8).image()
+    scenes::seeds(&mut tracer, settings, 16, if short_form() { 4 } else { 8 }).image()
 }
 
 fn assert_agree(what: &str, a: [Estimate; 3], b: [Estimate; 3]) {

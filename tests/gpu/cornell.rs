@@ -53,7 +53,7 @@ fn compare(bounces: Option<u32>, spp: u32) {
 
 #[test]
 fn emission_agrees() {
-    compare(Some(0), 32);
+    compare(Some(0), 8);
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn two_bounces_agree() {
 
 #[test]
 fn seven_bounces_agree() {
-    compare(Some(7), if short_form() { 4 } else { 16 });
+    compare(Some(7), if short_form() { 4 } else { 8 });
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_changed_albedo_is_noticed() {
     white.base_color = white.base_color.map(|c| c * 1.01);
     let settings = settings(Some(7), Integrator::Path);
     let mut tracer = gpu::path_tracer(&scene, &settings);
-    let ours = scenes::seeds(&mut tracer, &settings, SEEDS, 16);
+    let ours = scenes::seeds(&mut tracer, &settings, SEEDS, 8);
     let comparison = Comparison::new(&ours.tiles(), &Reference::everything(Some(7)).tiles, 0.01);
     println!("tiles: {comparison}");
     assert!(!comparison.passed(), "an albedo 1 % too high went unnoticed");

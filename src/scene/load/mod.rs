@@ -34,6 +34,8 @@ pub fn load_scene(path: &Path) -> SceneResult<Scene> {
     let scene = match extension.as_str() {
         "gltf" | "glb" => gltf::load(path),
         "obj" => obj::load(path),
+        "" => Err(SceneError::file(path, "the file's kind cannot be told without an extension")
+            .hint("name it .gltf, .glb or .obj")),
         _ => Err(SceneError::file(path, format!("scene files of the kind \"{extension}\" are not supported"))
             .hint("convert it to one of .gltf, .glb, .obj")),
     }?;
