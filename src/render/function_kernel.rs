@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ash::vk::BufferUsageFlags as Usage;
 
-use super::scene_buffers::{SceneBuffers, choose_array_form};
+use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
 use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Dispatch, Gpu, Kernel, KernelDescription, MemoryUse, Submission, TraceBackend,
     shader_compiler,
@@ -48,11 +48,7 @@ impl FunctionCall<'_> {
         let count = lanes as usize * outputs_per_lane as usize;
         let output = Buffer::new(gpu, "outputs", 16 * count as u64, Usage::STORAGE_BUFFER, MemoryUse::Readback)?;
         let arrays = buffers.bindings();
-        let array_binding = match (form.0, &buffers.addresses) {
-            (ArrayForm::TexelBuffer, _) => BindingResource::TexelArray(&arrays),
-            (ArrayForm::DeviceAddress, Some(addresses)) => BindingResource::Uniform(addresses),
-            _ => BindingResource::StorageArray(&arrays),
-        };
+        let array_binding = array_binding(&buffers, form.0, &arrays);
         let mut set = vec![
             BindingResource::Uniform(&constants),
             BindingResource::Storage(&input),

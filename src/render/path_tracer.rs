@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use ash::vk::BufferUsageFlags as Usage;
 
 use super::kernel_key::KernelKey;
-use super::scene_buffers::{SceneBuffers, choose_array_form};
+use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceOutcome, SliceSizes};
 use super::{Integrator, NonFiniteSample, ProgressUpdate, Settings, StopReason};
 use crate::film::Film;
@@ -106,11 +106,12 @@ impl PathTracer {
         )?;
         let slice_lanes = overrides.slice_lanes.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
         let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes)).collect();
-        let slices = slices?;
+        let mut slices = slices?;
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let key = KernelKey::new(prepared, camera, settings, trace, form);
         let kernel = build_kernel(gpu, &key, settings, overrides, &buffers, &constants_buffer, &slices)?;
+        slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
             gpu: gpu.clone(),
@@ -319,11 +320,7 @@ fn build_kernel(
 ) -> Result<Kernel> {
     let spirv = kernel_spirv(key, settings)?;
     let arrays = buffers.bindings();
-    let array_binding = match (key.array_form, &buffers.addresses) {
-        (ArrayForm::TexelBuffer, _) => BindingResource::TexelArray(&arrays),
-        (ArrayForm::DeviceAddress, Some(addresses)) => BindingResource::Uniform(addresses),
-        _ => BindingResource::StorageArray(&arrays),
-    };
+    let array_binding = array_binding(buffers, key.array_form, &arrays);
     let sets: Vec<Vec<BindingResource<'_>>> = slices
         .iter()
         .map(|slice| {

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use ash::vk::BufferUsageFlags as Usage;
 
 use crate::gpu::{
-    AccelerationStructures, ArrayForm, Buffer, DeviceInfo, DeviceKind, Gpu, GpuError, GpuResult, InstanceGeometry,
-    MeshGeometry, TraceBackend,
+    AccelerationStructures, ArrayForm, BindingResource, Buffer, DeviceInfo, DeviceKind, Gpu, GpuError, GpuResult,
+    InstanceGeometry, MeshGeometry, TraceBackend,
 };
 use crate::layout::{MAX_CHUNKS, SCENE_ARRAYS, SceneArray, Texel};
 use crate::prepare::Prepared;
@@ -99,6 +99,19 @@ impl SceneBuffers {
             .flat_map(|array| (0..MAX_CHUNKS).map(move |i| array.get(i)))
             .map(|chunk| chunk.unwrap_or(&self.empty))
             .collect()
+    }
+}
+
+/// What is bound as `scene_arrays` (`array_addresses` for device addresses); `chunks` is [`SceneBuffers::bindings`].
+pub(super) fn array_binding<'a>(
+    buffers: &'a SceneBuffers,
+    form: ArrayForm,
+    chunks: &'a [&'a Buffer],
+) -> BindingResource<'a> {
+    match (form, &buffers.addresses) {
+        (ArrayForm::TexelBuffer, _) => BindingResource::TexelArray(chunks),
+        (ArrayForm::DeviceAddress, Some(addresses)) => BindingResource::Uniform(addresses),
+        _ => BindingResource::StorageArray(chunks),
     }
 }
 

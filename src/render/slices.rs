@@ -75,6 +75,13 @@ impl Slice {
         self.dispatch(kernel, set)
     }
 
+    /// Runs the kernel with nothing to do: lavapipe compiles at the first dispatch, and that is no part of rendering.
+    pub(super) fn warm_up(&mut self, kernel: &Kernel) -> Result<()> {
+        let push = bytemuck::bytes_of(&SliceConstants { lanes: 0, ..SliceConstants::default() }).to_vec();
+        self.submission.submit(&[Dispatch::Run { kernel, set: 0, push: &push, lanes: 1 }])?;
+        Ok(self.submission.wait()?)
+    }
+
     fn dispatch(&mut self, kernel: &Kernel, set: usize) -> Result<()> {
         let push = bytemuck::bytes_of(&self.constants);
         self.submission.submit(&[Dispatch::Run { kernel, set, push, lanes: self.constants.lanes }])?;
