@@ -37,6 +37,11 @@ pub fn short_form() -> bool {
     std::env::var("SUNFLECK_TEST_DRIVER").is_ok_and(|driver| driver != "system")
 }
 
+/// True on a driver that is slower by an order of magnitude; statistical tests then take fewer samples still.
+pub fn slow_driver() -> bool {
+    std::env::var("SUNFLECK_TEST_DRIVER").is_ok_and(|driver| driver == "swiftshader")
+}
+
 /// Renders `seeds` independent images.
 pub fn seeds(tracer: &mut PathTracer, settings: &Settings, seeds: u32, spp: u32) -> TileStatistics {
     let mut statistics = TileStatistics::new(settings.width as usize, settings.height as usize, 8);

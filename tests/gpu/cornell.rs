@@ -1,7 +1,7 @@
 //! The built-in Cornell box against Mitsuba's renderings of it (tests/reference/).
 
 use crate::common::reference::{RESOLUTION, Reference, TILE};
-use crate::common::scenes::{scene, short_form};
+use crate::common::scenes::{scene, short_form, slow_driver};
 use crate::common::statistics::{Comparison, Estimate, TileStatistics};
 use crate::common::{gpu, scenes};
 use sunfleck::render::{Integrator, Settings};
@@ -53,7 +53,7 @@ fn compare(bounces: Option<u32>, spp: u32) {
 
 #[test]
 fn emission_agrees() {
-    compare(Some(0), 8);
+    compare(Some(0), if slow_driver() { 4 } else { 8 });
 }
 
 #[test]
@@ -72,7 +72,16 @@ fn two_bounces_agree() {
 
 #[test]
 fn seven_bounces_agree() {
-    compare(Some(7), if short_form() { 4 } else { 8 });
+    compare(
+        Some(7),
+        if slow_driver() {
+            2
+        } else if short_form() {
+            4
+        } else {
+            8
+        },
+    );
 }
 
 #[test]
