@@ -37,9 +37,11 @@ pub fn short_form() -> bool {
     std::env::var("SUNFLECK_TEST_DRIVER").is_ok_and(|driver| driver != "system")
 }
 
-/// True on a driver that is slower by an order of magnitude; statistical tests then take fewer samples still.
+/// True where rendering is slower by an order of magnitude (SwiftShader, and the ray queries of a software driver);
+/// statistical tests then take fewer samples still.
 pub fn slow_driver() -> bool {
-    std::env::var("SUNFLECK_TEST_DRIVER").is_ok_and(|driver| driver == "swiftshader")
+    let is = |name: &str, value: &str| std::env::var(name).is_ok_and(|text| text == value);
+    short_form() && (is("SUNFLECK_TEST_DRIVER", "swiftshader") || is("SUNFLECK_TEST_TRACE", "ray-query"))
 }
 
 /// Renders `seeds` independent images.
