@@ -5,7 +5,7 @@
 //! scripts/with-driver.sh).
 
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use sunfleck::gpu::shader_compiler::{Sources, read_sources};
@@ -16,6 +16,8 @@ use sunfleck::render::{
     BindingOverride, FunctionCall, PathTracer, Run, Settings, TraceChoice, open_device, prepare_scene,
 };
 use sunfleck::scene::{Scene, builtin};
+
+use super::mutation::SHADERS_VARIABLE;
 
 /// The device under test, with its trace back end.
 #[derive(Clone)]
@@ -45,9 +47,14 @@ pub fn assert_no_validation_messages() {
     assert!(messages.is_empty(), "validation messages: {messages:#?}");
 }
 
+/// The folder of shader sources of a mutated run (tests/common/mutation.rs); `None` where the tree's are under test.
+fn shaders_dir() -> Option<PathBuf> {
+    std::env::var_os(SHADERS_VARIABLE).map(PathBuf::from)
+}
+
 /// Small default settings for tests.
 pub fn settings(width: u32, height: u32) -> Settings {
-    Settings { width, height, ..Settings::default() }
+    Settings { width, height, shaders_dir: shaders_dir(), ..Settings::default() }
 }
 
 /// A scene on the device under test.
@@ -74,10 +81,13 @@ pub fn run(tracer: &mut PathTracer, seed: u32, spp: u32) -> Run {
     run
 }
 
-/// The shader sources of the tree.
+/// The shader sources under test: the tree's, or those of a mutated run.
 pub fn sources() -> &'static Sources {
     static SOURCES: OnceLock<Sources> = OnceLock::new();
-    SOURCES.get_or_init(|| read_sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders")).expect("shaders/"))
+    SOURCES.get_or_init(|| {
+        let folder = shaders_dir().unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
+        read_sources(&folder).expect("the folder of shader sources is readable")
+    })
 }
 
 /// A scene prepared for its first camera, with the constants that a kernel needs.

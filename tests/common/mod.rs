@@ -4,6 +4,7 @@
 pub mod bsdf;
 pub mod gpu;
 pub mod kernel;
+pub mod mutation;
 pub mod reference;
 pub mod scenes;
 pub mod statistics;

@@ -12,6 +12,7 @@ mod environment_chi_square;
 mod furnace;
 mod layout;
 mod light_sampling;
+mod mutations;
 mod sampler;
 mod shader_math;
 mod shaders_valid;

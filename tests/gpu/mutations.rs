@@ -1,0 +1,91 @@
+//! Deliberate bugs in the shaders, each with the test that notices it: what the suite is worth. A mutation is caught or the
+//! suite fails. They judge the tests, not the driver, so one driver is enough.
+
+use crate::common::mutation::{Mutation, assert_caught, assert_passes_unchanged};
+use crate::common::scenes::short_form;
+
+/// `name: "file", "original" => "mutant", caught by "test";`
+macro_rules! mutations {
+    ($($(#[$doc:meta])* $name:ident: $file:literal, $original:literal => $mutant:literal, caught by $test:literal;)+) => {
+        $($(#[$doc])* #[test] fn $name() {
+            if !short_form() {
+                assert_caught(&Mutation { file: $file, original: $original, mutant: $mutant }, $test);
+            }
+        })+
+    };
+}
+
+mutations! {
+    /// Cosine-distributed directions that claim to be uniform.
+    wrong_pdf: "include/bsdf_lambertian.glsl",
+        "return max(wi.y, 0.0) * INV_PI;" => "return wi.y > 0.0 ? 0.5 * INV_PI : 0.0;",
+        caught by "bsdf_chi_square::scattered_directions_follow_the_pdf";
+    /// Light that arrives at a slant counts as much as from above.
+    missing_cosine: "path_trace.comp",
+        "bsdf_evaluate(surface.bsdf, wo, wi) * (wi.y * weight) * light.radiance" =>
+        "bsdf_evaluate(surface.bsdf, wo, wi) * weight * light.radiance",
+        caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
+    /// The columns of the environment are drawn from the row below.
+    shifted_cdf: "include/environment.glsl",
+        "environment_row_word(constants, row.index)" =>
+        "environment_row_word(constants, (row.index + 1u) % constants.environment_height)",
+        caught by "environment_chi_square::importance_sampling_follows_the_pdf";
+    /// The environment's density per texel area, not per solid angle.
+    dropped_jacobian: "include/environment.glsl",
+        "(2.0 * PI * PI * sine)" => "(2.0 * PI * PI)",
+        caught by "environment_chi_square::importance_sampling_follows_the_pdf";
+    /// A lamp's density per area, not per solid angle.
+    dropped_distance: "include/light.glsl",
+        "pick / point.area * (distance * distance) / abs(cosine)" => "pick / point.area / abs(cosine)",
+        caught by "light_sampling::densities_are_per_solid_angle";
+    /// What rounding cuts off is lost.
+    float_accumulator: "include/lane.glsl",
+        "lane.compensation += lost;" => "",
+        caught by "determinism::integrators_add_up";
+    /// Radiance is carried through a boundary as if it were power.
+    eta_squared_left_out: "include/bsdf_specular.glsl",
+        "p.color / (p.eta * p.eta)" => "p.color",
+        caught by "bsdf_delta::refract_reflects_totally_or_not_at_all";
+    /// The light sample gets the BSDF sample's weight.
+    swapped_mis_weight: "path_trace.comp",
+        "weight = mis_weight(light.pdf, bsdf_density)" => "weight = mis_weight(bsdf_density, light.pdf)",
+        caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
+    /// The point on the lamp and the scattered direction from the same numbers.
+    correlated_dimension: "include/rng.glsl",
+        "DIMENSIONS_LIGHT = 3u" => "DIMENSIONS_LIGHT = 2u",
+        caught by "sampler::no_two_groups_share_numbers";
+    /// A hash whose low bits repeat along the columns of the image.
+    weak_hash: "include/rng.glsl",
+        "    v ^= v >> 16u;\n    pcg_mix(v);\n    return v;" => "    return v;",
+        caught by "sampler::dimensions_are_uniform_and_independent";
+    /// The square root of a negative number beyond the critical angle.
+    unclamped_cosine: "include/fresnel.glsl",
+        "scaled > 0.0 ? sqrt(scaled) / eta : -1.0" => "sqrt(scaled) / eta",
+        caught by "bsdf_delta::refract_reflects_totally_or_not_at_all";
+    /// A ray through an edge belongs to neither triangle.
+    leaky_edges: "include/trace_bvh.glsl",
+        "(u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)" =>
+        "(u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)",
+        caught by "watertight::axis_parallel_rays_do_not_leak";
+    /// Boxes that are narrower than what rounding leaves of a ray.
+    shrunken_boxes: "include/trace_bvh.glsl",
+        "(16.0 * UNIT_ROUNDOFF)" => "(-16.0 * UNIT_ROUNDOFF)",
+        caught by "watertight::axis_parallel_rays_do_not_leak";
+    /// Paths end at random and nobody takes their place.
+    roulette_without_compensation: "path_trace.comp",
+        "lane.throughput /= survival;" => "",
+        caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
+    /// Emission met by chance is weighted as if its lamp were the only one.
+    pick_left_out: "include/light.glsl",
+        "return light_pick_probability(constants, light) / point.area" => "return 1.0 / point.area",
+        caught by "light_sampling::densities_are_per_solid_angle";
+}
+
+/// A call of a shader function and a render pass with the same sources read from a folder: what fails is the mutant.
+#[test]
+fn unchanged_shaders_are_not_blamed() {
+    if !short_form() {
+        assert_passes_unchanged("bsdf_delta::refract_reflects_totally_or_not_at_all");
+        assert_passes_unchanged("determinism::sample_ranges_add_up");
+    }
+}
