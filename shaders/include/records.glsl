@@ -55,15 +55,16 @@ struct Affine {
     vec4 z;
 };
 
+// The rows that begin at a texel of an instance's record.
+Affine load_affine(uint texel) {
+    return Affine(uintBitsToFloat(LOAD4(TABLES, texel)), uintBitsToFloat(LOAD4(TABLES, texel + 1u)),
+                  uintBitsToFloat(LOAD4(TABLES, texel + 2u)));
+}
 Affine load_object_to_world(RenderConstants constants, uint instance) {
-    uint base = constants.instances + instance * INSTANCE_TEXELS;
-    return Affine(uintBitsToFloat(LOAD4(TABLES, base)), uintBitsToFloat(LOAD4(TABLES, base + 1u)),
-                  uintBitsToFloat(LOAD4(TABLES, base + 2u)));
+    return load_affine(constants.instances + instance * INSTANCE_TEXELS);
 }
 Affine load_world_to_object(RenderConstants constants, uint instance) {
-    uint base = constants.instances + instance * INSTANCE_TEXELS + 3u;
-    return Affine(uintBitsToFloat(LOAD4(TABLES, base)), uintBitsToFloat(LOAD4(TABLES, base + 1u)),
-                  uintBitsToFloat(LOAD4(TABLES, base + 2u)));
+    return load_affine(constants.instances + instance * INSTANCE_TEXELS + 3u);
 }
 // (root slot, first light, mirrored, unused)
 uvec4 load_instance_header(RenderConstants constants, uint instance) {

@@ -36,7 +36,6 @@ pub struct BindingOverride {
 
 /// A scene on a device, ready to be rendered.
 pub struct PathTracer {
-    gpu: Arc<Gpu>,
     key: KernelKey,
     kernel: Kernel,
     constants: RenderConstants,
@@ -114,7 +113,6 @@ impl PathTracer {
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
-            gpu: gpu.clone(),
             key,
             kernel,
             constants,
@@ -187,11 +185,6 @@ impl PathTracer {
         }
         run.seconds = start.elapsed().as_secs_f64();
         Ok(run)
-    }
-
-    /// The device.
-    pub fn gpu(&self) -> &Arc<Gpu> {
-        &self.gpu
     }
 }
 

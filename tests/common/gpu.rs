@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use sunfleck::gpu::shader_compiler::{Sources, read_sources};
-use sunfleck::gpu::{Gpu, TraceBackend, take_validation_messages};
+use sunfleck::gpu::{Gpu, TraceBackend, take_validation_messages, validation_is_available};
 use sunfleck::layout::RenderConstants;
 use sunfleck::prepare::{Prepared, camera_constants};
 use sunfleck::render::{
@@ -30,6 +30,7 @@ pub struct TestDevice {
 pub fn device() -> TestDevice {
     static DEVICE: OnceLock<TestDevice> = OnceLock::new();
     let device = DEVICE.get_or_init(|| {
+        assert!(validation_is_available(), "the Khronos validation layer is missing, see `make deps`");
         let trace = match std::env::var("SUNFLECK_TEST_TRACE") {
             Ok(name) => name.parse().expect("SUNFLECK_TEST_TRACE is bvh or ray-query"),
             Err(_) => TraceChoice::Auto,
