@@ -32,7 +32,8 @@ pub fn all_scenes() -> Vec<String> {
     names
 }
 
-/// True where the whole suite runs on several drivers in turn: statistical tests then take fewer samples.
+/// True where the whole suite runs on several drivers in turn: statistical tests then take fewer samples, and fewer scenes
+/// and modes, since a software driver takes seconds to compile each kernel.
 pub fn short_form() -> bool {
     std::env::var("SUNFLECK_TEST_DRIVER").is_ok_and(|driver| driver != "system")
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::common::scenes::{all_scenes, scene, short_form, slow_driver};
+use crate::common::scenes::{all_scenes, scene, short_form};
 use crate::common::statistics::Estimate;
 use crate::common::{gpu, scenes};
 use sunfleck::render::{EnvSampling, LightSampling, MisHeuristic, Settings};
@@ -42,8 +42,9 @@ fn ways_to_look_for_light_agree_on_every_scene() {
         if name.starts_with("furnace") {
             continue;
         }
-        // The others need more samples than a slow driver can draw.
-        if slow_driver() && !["cornell", "environment", "punctual", "textured"].contains(&name) {
+        // Each scene takes four kernels, and a software driver seconds to compile each; the others need more samples than a
+        // slow driver can draw.
+        if short_form() && !["cornell", "environment", "punctual", "textured"].contains(&name) {
             continue;
         }
         let scene = scene(name);

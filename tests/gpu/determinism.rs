@@ -3,7 +3,7 @@
 use std::ops::{ControlFlow, Range};
 
 use crate::common::gpu;
-use crate::common::scenes::{scene, slow_driver};
+use crate::common::scenes::{scene, short_form};
 use sunfleck::film::Film;
 use sunfleck::gpu::ArrayForm;
 use sunfleck::render::{BindingOverride, Integrator, PathTracer, Settings};
@@ -12,9 +12,9 @@ fn settings() -> Settings {
     gpu::settings(50, 37)
 }
 
-/// A slow driver takes the first scene alone.
+/// The short form takes the first scene alone: each brings kernels of its own.
 fn some(scenes: &'static [&'static str]) -> &'static [&'static str] {
-    if slow_driver() { &scenes[..1] } else { scenes }
+    if short_form() { &scenes[..1] } else { scenes }
 }
 
 fn film(name: &str, settings: &Settings, overrides: BindingOverride, samples: Range<u32>) -> Film {

@@ -1,6 +1,6 @@
 //! Furnaces: scenes whose every pixel has a known radiance.
 
-use crate::common::scenes::{scene, short_form, slow_driver};
+use crate::common::scenes::{scene, short_form};
 use crate::common::statistics::{Comparison, Estimate};
 use crate::common::{gpu, scenes};
 use sunfleck::render::{LightSampling, Settings};
@@ -29,7 +29,7 @@ fn assert_radiance(name: &str, light_sampling: LightSampling, radiance: f64, spp
 /// The modes under test; their agreement has a test of its own.
 fn modes() -> &'static [LightSampling] {
     let all = &[LightSampling::Mis, LightSampling::Mixture, LightSampling::Bsdf];
-    if slow_driver() { &all[..1] } else { all }
+    if short_form() { &all[..1] } else { all }
 }
 
 #[test]
