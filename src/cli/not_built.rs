@@ -12,8 +12,6 @@ type Entry = (&'static str, fn(&Command) -> bool);
 const NOT_BUILT: &[Entry] = &[
     ("bench", |c| matches!(c, Command::Bench(_))),
     ("watch", |c| matches!(c, Command::Watch(_))),
-    ("--target-error", |c| render(c, |r| r.target_error.is_some())),
-    ("--estimate", |c| render(c, |r| r.estimate)),
     ("--aov", |c| render(c, |r| !r.aov.is_empty())),
     ("--denoise", |c| render(c, |r| r.denoise)),
     ("--checkpoint", |c| render(c, |r| r.checkpoint.is_some())),

@@ -121,6 +121,8 @@ fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {
         kernel_key: Some(result.kernel_key.clone()),
         scene: Some(scene.name.clone()),
         integrator: Some(job.settings.integrator.to_string()),
+        estimated_error: result.error_estimate.map(|e| e.error as f32),
+        estimated_error_interval: result.error_estimate.map(|e| e.interval.map(|bound| bound as f32)),
         device: Some(format!("{}, {}", result.device, result.driver)),
         ..Metadata::default()
     }
@@ -135,6 +137,11 @@ fn verdict(settings: &Settings, result: &RenderResult) -> anyhow::Result<()> {
         let count = result.non_finite_samples;
         return Err(Error::Untrustworthy(format!("--strict: {count} samples were NaN or infinite")).into());
     }
+    if let Some(target) =
+        settings.target_error.filter(|_| settings.strict && result.stopped_by != StopReason::TargetError)
+    {
+        return Err(Error::Untrustworthy(format!("--strict: the target error of {target} was not reached")).into());
+    }
     Ok(())
 }
 
@@ -142,6 +149,7 @@ fn verdict(settings: &Settings, result: &RenderResult) -> anyhow::Result<()> {
 mod tests {
     use super::*;
     use sunfleck::film::exr::read_exr;
+    use sunfleck::film::replicates::ErrorEstimate;
     use sunfleck::film::tonemap::ToneMap;
     use sunfleck::render::{NonFiniteSample, Seconds};
 
@@ -179,8 +187,28 @@ mod tests {
             first_non_finite: Vec::new(),
             world_to_camera: [1.0; 16],
             world_to_ndc: [2.0; 16],
+            error_estimate: None,
             warnings: Vec::new(),
         }
+    }
+
+    #[test]
+    fn an_error_that_is_asked_for_is_reported_and_judged() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut job = job(folder.path());
+        (job.settings.target_error, job.settings.strict) = (Some(0.1), true);
+        let estimate = ErrorEstimate { error: 0.2, interval: [0.1, 0.4], replicates: 4 };
+        let short = RenderResult { error_estimate: Some(estimate), ..result() };
+        assert_eq!(exit_code(&finish(&job, &Scene::default(), short.clone()).unwrap_err()), 6);
+        let report = report(&job, &Scene::default(), &short);
+        assert_eq!(report["estimated_error"], 0.2);
+        assert_eq!(report["estimated_error_interval"], serde_json::json!([0.1, 0.4]));
+        assert_eq!((&report["estimated_error_replicates"], &report["target_error"]), (&4.into(), &0.1.into()));
+        let image = read_exr(&folder.path().join("a.exr")).unwrap();
+        assert_eq!(image.metadata.estimated_error, Some(0.2));
+        assert_eq!(image.metadata.estimated_error_interval, Some([0.1, 0.4]));
+        let reached = RenderResult { stopped_by: StopReason::TargetError, ..short };
+        finish(&job, &Scene::default(), reached).unwrap();
     }
 
     fn exit_code(error: &anyhow::Error) -> u8 {

@@ -19,6 +19,7 @@ const EXAMPLES: &str = "\
 Examples:
   sunfleck render                                   the Cornell box, to cornell.exr and cornell.png
   sunfleck render scene.gltf -o a.exr -o a.png --spp 512
+  sunfleck render scene.glb --target-error 0.02 --time 10m     as good as 2 %, within ten minutes
   sunfleck render scene.glb --time 30s --resolution 1920x1080 --json
   sunfleck render scene.obj --env sky.hdr --env-rotation 90 --exposure -1
   sunfleck render scene.gltf --samples 0..64 -o part0.exr     one part of a farm's work
@@ -54,21 +55,19 @@ pub(crate) struct RenderArgs {
     #[arg(long, help_heading = "Image")]
     pub(super) denoise: bool,
 
-    /// Samples per pixel [default: 128, or without limit if --time is given].
+    /// Samples per pixel [default: 128, or without limit if --time or --target-error is given].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "samples", help_heading = "How long")]
     spp: Option<u32>,
     /// Stop rendering after this time, as in 500ms, 30s, 2m, 1h.
     #[arg(long, value_name = "TIME", value_parser = parse::duration, help_heading = "How long")]
     time: Option<Duration>,
-    /// Stop at this relative error.
+    /// Stop when the estimated relative error is this small, as in 0.02 for 2 %; see --estimate. First looked at after 64
+    /// samples per pixel, and without limit if neither --spp nor --time is given.
     #[arg(long, value_name = "ERROR", value_parser = parse::positive, help_heading = "How long")]
-    pub(super) target_error: Option<f64>,
+    target_error: Option<f64>,
     /// Render the sample indices from A up to but without B only; `sunfleck merge` joins such parts to one run.
     #[arg(long, value_name = "A..B", value_parser = parse::sample_range, help_heading = "How long")]
     samples: Option<Range<u32>>,
-    /// Say what the render would take, and do not render.
-    #[arg(long, help_heading = "How long")]
-    pub(super) estimate: bool,
     /// Save the state of the run to this file now and then.
     #[arg(long, value_name = "FILE", help_heading = "How long")]
     pub(super) checkpoint: Option<PathBuf>,
@@ -118,6 +117,9 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "DIR", help_heading = "Device")]
     shaders: Option<PathBuf>,
 
+    /// Estimate the error of the image from replicates, with an interval for it; needs 32 samples per pixel or more.
+    #[arg(long, help_heading = "Reports")]
+    estimate: bool,
     /// Print one JSON object about the run on standard output.
     #[arg(long, help_heading = "Reports")]
     json: bool,
@@ -169,12 +171,15 @@ impl RenderArgs {
             return Err(Error::Usage(format!("--shaders: '{}' is not a folder", folder.display())));
         }
         let (width, height) = self.resolution;
-        let without_limit = if self.time.is_some() { u32::MAX } else { Settings::default().spp };
+        let without_limit =
+            if self.time.is_some() || self.target_error.is_some() { u32::MAX } else { Settings::default().spp };
         let settings = Settings {
             width,
             height,
             spp: self.spp.unwrap_or(without_limit),
             time: self.time,
+            target_error: self.target_error,
+            estimate: self.estimate,
             sample_range: self.samples,
             seed: self.seed,
             max_bounces: self.max_bounces,

@@ -1,6 +1,7 @@
 //! What `sunfleck render` says when it is done: a summary for people, an object for programs.
 
 use serde_json::{Value, json};
+use sunfleck::film::replicates::CONFIDENCE;
 use sunfleck::render::{RenderResult, StopReason};
 use sunfleck::scene::Scene;
 
@@ -36,7 +37,11 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "seconds": result.seconds,
         "rays_per_second": rate(result.rays),
         "paths_per_second": rate(result.paths),
-        "estimated_error": result.film.estimated_error(),
+        "estimated_error": estimated_error(result),
+        "estimated_error_interval": result.error_estimate.map(|e| e.interval),
+        "estimated_error_confidence": result.error_estimate.map(|_| CONFIDENCE),
+        "estimated_error_replicates": result.error_estimate.map(|e| e.replicates),
+        "target_error": job.settings.target_error,
         "non_finite_samples": result.non_finite_samples,
         "first_non_finite": result.first_non_finite,
         "gpu_bytes": result.gpu_bytes,
@@ -46,13 +51,29 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
     })
 }
 
+/// From the replicates where they were asked for, else from the variance of the samples.
+fn estimated_error(result: &RenderResult) -> Option<f64> {
+    result.error_estimate.map(|estimate| estimate.error).or_else(|| result.film.estimated_error())
+}
+
+fn print_error(result: &RenderResult) {
+    let Some(error) = estimated_error(result) else { return };
+    eprint!("  estimated relative error {:.3} %", 100.0 * error);
+    if let Some(estimate) = result.error_estimate {
+        let [low, high] = estimate.interval.map(|bound| 100.0 * bound);
+        let confidence = 100.0 * CONFIDENCE;
+        eprint!(" ({confidence:.0} %: {low:.3} % to {high:.3} %, from {} replicates)", estimate.replicates);
+    }
+    eprintln!();
+}
+
 /// What the run did, in a few lines on standard error.
 pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
     let film = &result.film;
     let why = match result.stopped_by {
         StopReason::Samples => "all samples are done",
         StopReason::Time => "the time was up",
-        StopReason::TargetError => "the error was reached",
+        StopReason::TargetError => "the target error was reached",
         StopReason::Interrupted => "interrupted",
     };
     eprintln!(
@@ -65,9 +86,7 @@ pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
     let seconds = result.seconds.render.max(1e-9);
     let rate = |count: u64| with_prefix(count as f64 / seconds);
     eprintln!("  {}paths/s, {}rays/s", rate(result.paths), rate(result.rays));
-    if let Some(error) = film.estimated_error() {
-        eprintln!("  estimated relative error {:.3} %", 100.0 * error);
-    }
+    print_error(result);
     if result.non_finite_samples > 0 {
         eprintln!("warning: {} samples were NaN or infinite; each is a bug:", result.non_finite_samples);
         for s in &result.first_non_finite {

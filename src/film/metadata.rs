@@ -33,6 +33,10 @@ pub struct Metadata {
     pub scene: Option<String>,
     /// `integrator` (string).
     pub integrator: Option<String>,
+    /// `estimatedError` (float): relative, see [`super::replicates::ErrorEstimate`].
+    pub estimated_error: Option<f32>,
+    /// `estimatedErrorInterval` (v2f): its bounds.
+    pub estimated_error_interval: Option<[f32; 2]>,
     /// `device` (string): device and driver.
     pub device: Option<String>,
     /// All other string attributes, by name.
@@ -104,6 +108,9 @@ impl Metadata {
         put("samplesPerPixel", self.samples_per_pixel.map(AttributeValue::F32));
         put("seed", self.seed.map(|s| AttributeValue::I32(s.cast_signed())));
         put("renderTime", self.render_time_seconds.map(AttributeValue::F32));
+        put("estimatedError", self.estimated_error.map(AttributeValue::F32));
+        let interval = self.estimated_error_interval.map(|[low, high]| AttributeValue::FloatVec2(Vec2(low, high)));
+        put("estimatedErrorInterval", interval);
         let ranges = (!self.sample_ranges.is_empty()).then(|| format_ranges(&self.sample_ranges));
         let strings = [
             ("sampleRanges", ranges.as_ref()),
@@ -133,6 +140,10 @@ impl Metadata {
                 ("samplesPerPixel", AttributeValue::I32(v)) => metadata.samples_per_pixel = Some(*v as f32),
                 ("seed", AttributeValue::I32(v)) => metadata.seed = Some(v.cast_unsigned()),
                 ("renderTime", AttributeValue::F32(v)) => metadata.render_time_seconds = Some(*v),
+                ("estimatedError", AttributeValue::F32(v)) => metadata.estimated_error = Some(*v),
+                ("estimatedErrorInterval", AttributeValue::FloatVec2(v)) => {
+                    metadata.estimated_error_interval = Some([v.0, v.1]);
+                }
                 ("sampleRanges", AttributeValue::Text(v)) => metadata.sample_ranges = parse_ranges(&string(v)),
                 ("kernelKey", AttributeValue::Text(v)) => metadata.kernel_key = Some(string(v)),
                 ("scene", AttributeValue::Text(v)) => metadata.scene = Some(string(v)),

@@ -8,6 +8,7 @@ pub mod metadata;
 pub mod metrics;
 pub mod output;
 pub mod png;
+pub mod replicates;
 pub mod tonemap;
 
 /// Weights of linear Rec.709 red, green and blue in the luminance (ITU-R BT.709).

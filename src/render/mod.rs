@@ -2,6 +2,7 @@
 
 mod function_kernel;
 mod kernel_key;
+mod looks;
 mod open;
 mod path_tracer;
 mod progress;
@@ -16,7 +17,7 @@ use std::time::Instant;
 pub use function_kernel::FunctionCall;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};
-pub use path_tracer::{BindingOverride, PathTracer, Run};
+pub use path_tracer::{BindingOverride, PathTracer, Run, RunPlan};
 pub use progress::ProgressUpdate;
 pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
 pub use scene_buffers::choose_array_form;
@@ -26,6 +27,7 @@ pub use settings::{
 };
 
 use crate::film::metadata::{world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective};
+use crate::film::replicates::ReplicateSums;
 use crate::prepare::{self, EnvironmentSampling, PrepareOptions, Prepared};
 use crate::scene::{Camera, Projection, Scene};
 use crate::{Error, Result};
@@ -75,11 +77,20 @@ pub fn render_on(
     let prepared = prepare_scene(scene, camera, settings)?;
     let prepare_seconds = start.elapsed().as_secs_f64();
     let mut tracer = PathTracer::new(&open.gpu, open.trace, &prepared, camera, settings, BindingOverride::default())?;
-    let run = tracer.run(settings.seed, settings.samples(), settings.time, progress)?;
+    let run = tracer.run_plan(settings.seed, &RunPlan::new(settings), progress)?;
     let mut warnings = Vec::new();
     if run.capped_samples > 0 {
         warnings
             .push(format!("{} samples had a path cut off at 65535 bounces: the image is too dark", run.capped_samples));
+    }
+    let error_estimate = run.replicates.as_ref().and_then(ReplicateSums::estimate);
+    if run.replicates.is_some() && error_estimate.is_none() {
+        warnings.push(String::from(
+            "the error is not known: every pixel needs at least two blocks of 16 samples, and finite sums",
+        ));
+    }
+    if let Some(target) = settings.target_error.filter(|_| run.stopped_by != StopReason::TargetError) {
+        warnings.push(format!("the target error of {target} was not reached"));
     }
     let aspect = f64::from(settings.width) / f64::from(settings.height);
     let key = tracer.key();
@@ -112,6 +123,7 @@ pub fn render_on(
             }
             Projection::Orthographic { ymag } => world_to_ndc_orthographic(camera.camera_to_world, ymag, aspect),
         },
+        error_estimate,
         warnings,
     })
 }

@@ -8,10 +8,12 @@ use std::time::{Duration, Instant};
 use ash::vk::BufferUsageFlags as Usage;
 
 use super::kernel_key::KernelKey;
+use super::looks::Looks;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceOutcome, SliceSizes};
 use super::{Integrator, NonFiniteSample, ProgressUpdate, Settings, StopReason};
 use crate::film::Film;
+use crate::film::replicates::ReplicateSums;
 use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
     shader_compiler,
@@ -49,6 +51,31 @@ pub struct PathTracer {
     pub upload_seconds: f64,
 }
 
+/// What a run renders and what ends it.
+#[derive(Clone, Debug)]
+pub struct RunPlan {
+    /// Sample indices.
+    pub samples: Range<u32>,
+    /// Wall time after which the run ends.
+    pub time: Option<Duration>,
+    /// Relative error at which it ends.
+    pub target_error: Option<f64>,
+    /// Keep the sums of replicates, which an error estimate is made of; a target implies it.
+    pub estimate: bool,
+}
+
+impl RunPlan {
+    /// What the settings ask for.
+    pub fn new(settings: &Settings) -> Self {
+        Self {
+            samples: settings.samples(),
+            time: settings.time,
+            target_error: settings.target_error,
+            estimate: settings.estimate,
+        }
+    }
+}
+
 /// What a run of the kernel returns.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -56,6 +83,8 @@ pub struct Run {
     pub film: Film,
     /// Which rule ended it.
     pub stopped_by: StopReason,
+    /// The sums of replicates, if they were asked for.
+    pub replicates: Option<ReplicateSums>,
     /// Rays traced.
     pub rays: u64,
     /// Paths traced.
@@ -146,18 +175,62 @@ impl PathTracer {
         time: Option<Duration>,
         progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
     ) -> Result<Run> {
+        self.run_plan(seed, &RunPlan { samples, time, target_error: None, estimate: false }, progress)
+    }
+
+    /// Renders what the plan says. The image of a run that ends at an error is, bit for bit, that of the same range.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn run_plan(
+        &mut self,
+        seed: u32,
+        plan: &RunPlan,
+        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+    ) -> Result<Run> {
         self.constants.seed = seed;
-        self.constants.first_sample = samples.start;
-        self.constants.end_sample = samples.end;
+        let looks = Looks::new(plan.samples.clone(), plan.target_error);
+        let mut sizes = SliceSizes::new(self.overrides, self.slices[0].lanes());
+        let mut run = Run::new(&self.constants, plan);
+        // An open end is no total.
+        let mut expected = (plan.samples.end < u32::MAX).then(|| plan.samples.end - plan.samples.start);
+        let (start, mut done, mut end) = (Instant::now(), plan.samples.start, looks.first_end());
+        loop {
+            self.constants.first_sample = done;
+            self.constants.end_sample = end;
+            let limits = Limits { start, time: plan.time, samples_total: expected.map(|n| self.total_samples(n)) };
+            self.run_range(&mut run, &mut sizes, &limits, progress)?;
+            if run.stopped_by != StopReason::Samples || plan.target_error.is_none() {
+                break;
+            }
+            let error = run.replicates.as_ref().and_then(ReplicateSums::estimate).map(|estimate| estimate.error);
+            if error.is_some_and(|error| looks.is_reached(error)) {
+                run.stop(StopReason::TargetError);
+            }
+            if run.stopped_by != StopReason::Samples || end == plan.samples.end {
+                break;
+            }
+            expected = error.and_then(|error| looks.expected_samples(end, error));
+            (done, end) = (end, looks.next_end(end, error));
+        }
+        run.seconds = start.elapsed().as_secs_f64();
+        Ok(run)
+    }
+
+    /// Renders the range of samples that stands in the constants, and adds it to the run.
+    fn run_range(
+        &mut self,
+        run: &mut Run,
+        sizes: &mut SliceSizes,
+        limits: &Limits,
+        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+    ) -> Result<()> {
         self.constants_buffer.write(&[self.constants])?;
         let mut schedule = Schedule::new(&self.constants);
-        let mut sizes = SliceSizes::new(self.overrides, self.slices[0].lanes());
-        let mut run = Run::new(&self.constants);
         let mut in_flight = VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
-        let start = Instant::now();
         loop {
-            if time.is_some_and(|limit| start.elapsed() >= limit) && !schedule.is_done() {
+            if limits.time.is_some_and(|limit| limits.start.elapsed() >= limit) && !schedule.is_done() {
                 run.stop(StopReason::Time);
             }
             while run.stopped_by == StopReason::Samples && !schedule.is_done() {
@@ -167,25 +240,33 @@ impl PathTracer {
                 in_flight.push_back(slot);
             }
             // In the order of submission, so that a pixel's blocks are joined by their index.
-            let Some(slot) = in_flight.pop_front() else { break };
+            let Some(slot) = in_flight.pop_front() else { return Ok(()) };
             let outcome = self.slices[slot].finish(&self.kernel, slot)?;
             sizes.observe(&outcome);
             run.add(&self.constants, &outcome, self.slices[slot].results(outcome.constants.lanes)?);
             free.push(slot);
             let update = ProgressUpdate {
                 samples_done: run.paths,
-                // An open end is no total.
-                samples_total: (samples.end < u32::MAX).then(|| schedule.total_samples(&self.constants)),
-                elapsed: start.elapsed(),
-                time_limit: time,
+                samples_total: limits.samples_total,
+                elapsed: limits.start.elapsed(),
+                time_limit: limits.time,
             };
             if progress(&update).is_break() {
                 run.stop(StopReason::Interrupted);
             }
         }
-        run.seconds = start.elapsed().as_secs_f64();
-        Ok(run)
     }
+
+    fn total_samples(&self, per_pixel: u32) -> u64 {
+        u64::from(per_pixel) * u64::from(self.constants.width) * u64::from(self.constants.height)
+    }
+}
+
+/// What ends a range before its samples do, and what its progress is measured by.
+struct Limits {
+    start: Instant,
+    time: Option<Duration>,
+    samples_total: Option<u64>,
 }
 
 /// Hands out the atoms of a run: block by block, each over all pixels.
@@ -220,11 +301,6 @@ impl Schedule {
         self.next_atom += u64::from(lanes);
         constants
     }
-
-    fn total_samples(&self, constants: &RenderConstants) -> u64 {
-        let samples = constants.end_sample - constants.first_sample;
-        u64::from(samples) * u64::from(constants.width) * u64::from(constants.height)
-    }
 }
 
 impl Run {
@@ -235,9 +311,12 @@ impl Run {
         }
     }
 
-    fn new(constants: &RenderConstants) -> Self {
+    fn new(constants: &RenderConstants, plan: &RunPlan) -> Self {
+        let film = Film::new(constants.width, constants.height);
+        let replicates = plan.estimate || plan.target_error.is_some();
         Self {
-            film: Film::new(constants.width, constants.height),
+            replicates: replicates.then(|| ReplicateSums::new(film.pixels().len())),
+            film,
             stopped_by: StopReason::Samples,
             rays: 0,
             paths: 0,
@@ -258,12 +337,15 @@ impl Run {
             let (x, y) = pixel_of_index(constants, atom % pixels);
             let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
             let pixel = y as usize * constants.width as usize + x as usize;
+            let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
             self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples);
+            if let Some(replicates) = &mut self.replicates {
+                replicates.add_block(pixel, block, sum, result.samples);
+            }
             self.rays += u64::from(result.rays);
             self.paths += u64::from(result.samples);
             self.capped_samples += u64::from(result.capped.count_ones());
             self.non_finite_samples += u64::from(result.non_finite.count_ones());
-            let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
             for bit in (0..BLOCK_SAMPLES).filter(|bit| result.non_finite >> bit & 1 == 1) {
                 if self.first_non_finite.len() < REPORTED_NON_FINITE {
                     self.first_non_finite.push(NonFiniteSample { x, y, sample: block * BLOCK_SAMPLES + bit });

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::film::Film;
+use crate::film::replicates::ErrorEstimate;
 
 /// The outcome of a render.
 #[derive(Clone, Debug)]
@@ -39,6 +40,8 @@ pub struct RenderResult {
     pub world_to_camera: [f32; 16],
     /// See `world_to_camera`.
     pub world_to_ndc: [f32; 16],
+    /// The error with an interval, where the settings ask for it and enough samples were drawn.
+    pub error_estimate: Option<ErrorEstimate>,
     /// What the user should know, one line each.
     pub warnings: Vec<String>,
 }
@@ -50,7 +53,7 @@ pub enum StopReason {
     Samples,
     /// The time was up.
     Time,
-    /// The error was reached.
+    /// The target error was reached.
     TargetError,
     /// The caller's closure said so.
     Interrupted,

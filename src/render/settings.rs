@@ -17,10 +17,14 @@ pub struct Settings {
     pub width: u32,
     /// Height of the image in pixels, ≥ 1.
     pub height: u32,
-    /// Samples per pixel, ≥ 1; `u32::MAX` if only `time` ends the run.
+    /// Samples per pixel, ≥ 1; `u32::MAX` if only `time` or `target_error` ends the run.
     pub spp: u32,
     /// Wall time for rendering, after which the run ends.
     pub time: Option<Duration>,
+    /// Relative error at which the run ends ([`crate::film::replicates::ErrorEstimate::error`]).
+    pub target_error: Option<f64>,
+    /// Estimate the error from replicates; a `target_error` implies it.
+    pub estimate: bool,
     /// Only these sample indices, instead of `0..spp`.
     pub sample_range: Option<Range<u32>>,
     /// Seed of the sampler.
@@ -58,6 +62,8 @@ impl Default for Settings {
             height: 720,
             spp: 128,
             time: None,
+            target_error: None,
+            estimate: false,
             sample_range: None,
             seed: 0,
             max_bounces: None,

@@ -85,19 +85,17 @@ fn what_is_not_built_is_refused_by_name() {
         (&["bench"] as &[&str], "bench"),
         (&["bench", "cornell", "--anything", "1"], "bench"),
         (&["watch", "cornell"], "watch"),
-        (&["render", "--target-error", "0.01"], "--target-error"),
         (&["render", "--aov", "albedo,normal"], "--aov"),
         (&["render", "--denoise"], "--denoise"),
         (&["render", "--checkpoint", "c"], "--checkpoint"),
         (&["render", "--resume"], "--resume"),
-        (&["render", "--estimate"], "--estimate"),
         (&["render", "--sampler", "sobol"], "--sampler sobol"),
         (&["render", "--filter", "gaussian"], "--filter gaussian"),
         (&["render", "--device", "all"], "--device all"),
     ] {
         refused(arguments, 2, &[name, "not built yet"]);
     }
-    refused(&["render", "--denoise", "--estimate"], 2, &["--denoise", "--estimate"]);
+    refused(&["render", "--denoise", "--resume"], 2, &["--denoise", "--resume"]);
 }
 
 #[test]

@@ -152,10 +152,19 @@ pub fn sidak(alpha: f64, tests: usize) -> f64 {
 pub fn binomial_two_sided(successes: u64, trials: u64, probability: f64) -> f64 {
     assert!(successes <= trials && (0.0..=1.0).contains(&probability), "{successes} of {trials} at {probability}");
     let (k, n) = (successes as f64, trials as f64);
-    // P(X ≤ k) = I_{1−p}(n − k, k + 1), P(X ≥ k) = I_p(k, n − k + 1).
+    // P(X ≤ k) = I_{1−p}(n − k, k + 1).
     let at_most = if successes == trials { 1.0 } else { beta_regularised(1.0 - probability, n - k, k + 1.0) };
-    let at_least = if successes == 0 { 1.0 } else { beta_regularised(probability, k, n - k + 1.0) };
+    let at_least = binomial_at_least(successes, trials, probability);
     (2.0 * at_most.min(at_least)).min(1.0)
+}
+
+/// P(X ≥ successes) of `trials` of the given probability: I_p(k, n − k + 1).
+pub fn binomial_at_least(successes: u64, trials: u64, probability: f64) -> f64 {
+    match successes {
+        0 => 1.0,
+        k if k > trials => 0.0,
+        k => beta_regularised(probability, k as f64, (trials - k + 1) as f64),
+    }
 }
 
 /// The outcome of a χ² goodness-of-fit test.

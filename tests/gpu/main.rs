@@ -9,6 +9,7 @@ mod bsdf_delta;
 mod cornell;
 mod determinism;
 mod environment_chi_square;
+mod error_estimate;
 mod furnace;
 mod layout;
 mod light_sampling;

@@ -1,0 +1,149 @@
+//! The error estimate against the true error: the interval holds it as often as it says, and a run to a target error ends
+//! near it. The true error of an image is its distance from the mean of many others.
+
+use std::ops::ControlFlow;
+
+use crate::common::gpu;
+use crate::common::scenes::{scene, short_form};
+use crate::common::statistics::binomial_at_least;
+use sunfleck::film::replicates::{CONFIDENCE, ErrorEstimate};
+use sunfleck::film::{Film, RELATIVE_ERROR_EPSILON, luminance};
+use sunfleck::render::{PathTracer, RunPlan, StopReason};
+
+/// What one seed gave.
+struct Image {
+    luminance: Vec<f64>,
+    estimate: ErrorEstimate,
+    samples: u32,
+}
+
+fn plan(samples: u32, target_error: Option<f64>) -> RunPlan {
+    RunPlan { samples: 0..samples, time: None, target_error, estimate: true }
+}
+
+fn render(tracer: &mut PathTracer, seed: u32, plan: &RunPlan) -> (Image, StopReason) {
+    let run = tracer.run_plan(seed, plan, &mut |_| ControlFlow::Continue(())).expect("the device works");
+    gpu::assert_no_validation_messages();
+    let estimate = run.replicates.as_ref().and_then(|r| r.estimate()).expect("enough samples");
+    let image = Image { luminance: luminances(&run.film), estimate, samples: run.film.pixels()[0].count };
+    (image, run.stopped_by)
+}
+
+fn luminances(film: &Film) -> Vec<f64> {
+    film.pixels().iter().map(|pixel| luminance(pixel.mean())).collect()
+}
+
+/// Relative errors of the images, each against the mean of all others. Both are unbiased, so the square is larger than that
+/// of the distance to the truth by the reference's share of the variance.
+fn true_errors(images: &[Image]) -> Vec<f64> {
+    let count: f64 = images.iter().map(|image| f64::from(image.samples)).sum();
+    let sum = |pixel: usize| images.iter().map(|i| i.luminance[pixel] * f64::from(i.samples)).sum::<f64>();
+    let sums: Vec<f64> = (0..images[0].luminance.len()).map(sum).collect();
+    let error = |image: &Image| {
+        let own = f64::from(image.samples);
+        let term = |(y, sum): (&f64, &f64)| {
+            let truth = (sum - y * own) / (count - own);
+            let share = (count - own) / count;
+            (y - truth).powi(2) * share / (truth * truth + RELATIVE_ERROR_EPSILON * RELATIVE_ERROR_EPSILON)
+        };
+        (image.luminance.iter().zip(&sums).map(term).sum::<f64>() / sums.len() as f64).sqrt()
+    };
+    images.iter().map(error).collect()
+}
+
+fn images(name: &str, seeds: u32, samples: u32) -> Vec<Image> {
+    let mut tracer = gpu::path_tracer(&scene(name), &gpu::settings(24, 24));
+    (0..seeds).map(|seed| render(&mut tracer, seed, &plan(samples, None)).0).collect()
+}
+
+/// How many intervals, narrowed to a share of their width in the logarithm, hold the true error.
+fn covered(images: &[Image], errors: &[f64], share: f64) -> u64 {
+    let holds = |(image, error): (&Image, &f64)| {
+        let ratio = error / image.estimate.error;
+        let [low, high] = image.estimate.interval.map(|bound| (bound / image.estimate.error).powf(share));
+        u64::from((low..=high).contains(&ratio))
+    };
+    images.iter().zip(errors).map(holds).sum()
+}
+
+#[test]
+fn intervals_hold_the_true_error_as_often_as_they_say() {
+    // Two kinds of scene: every pixel well known, and fireflies from lamps that few paths find.
+    for (name, samples) in [("cornell", 128), ("cornell", 64), ("many_lights", 128)] {
+        if short_form() && (name, samples) != ("cornell", 64) {
+            continue;
+        }
+        let seeds = if short_form() { 20 } else { 100 };
+        let images = images(name, seeds, samples);
+        let errors = true_errors(&images);
+        let count = covered(&images, &errors, 1.0);
+        let width =
+            images.iter().map(|i| i.estimate.interval[1] / i.estimate.interval[0]).sum::<f64>() / f64::from(seeds);
+        println!("{name} at {samples}: {count} of {seeds} intervals hold the error; they span a factor of {width:.3}");
+        // P(X ≤ count) for the coverage that is promised: not too seldom.
+        let p = 1.0 - binomial_at_least(count + 1, u64::from(seeds), CONFIDENCE);
+        assert!(p > 0.01, "{name} at {samples}: {count} of {seeds}, p = {p}");
+        if name == "cornell" {
+            let ratios = errors.iter().zip(&images).map(|(error, image)| error / image.estimate.error);
+            let mean_ratio = ratios.sum::<f64>() / f64::from(seeds);
+            println!("  true over estimated error: {mean_ratio:.4} in the mean");
+            assert!((mean_ratio - 1.0).abs() < 0.05, "{mean_ratio}");
+            // At 64 samples there are four replicates alone.
+            assert!(
+                width < if samples == 128 { 1.5 } else { 2.0 },
+                "intervals that span a factor of {width} say nothing"
+            );
+            // Were they a third as wide, the test would see it.
+            let narrow = covered(&images, &errors, 1.0 / 3.0);
+            let p = 1.0 - binomial_at_least(narrow + 1, u64::from(seeds), CONFIDENCE);
+            assert!(p < 0.01, "{narrow} of {seeds} narrow intervals hold it too");
+        }
+    }
+}
+
+#[test]
+fn a_run_to_a_target_error_ends_near_it() {
+    let mut tracer = gpu::path_tracer(&scene("cornell"), &gpu::settings(48, 48));
+    let (seeds, targets): (u32, &[f64]) = if short_form() { (4, &[0.15]) } else { (10, &[0.14, 0.09]) };
+    for &target in targets {
+        let images: Vec<Image> = (0..seeds)
+            .map(|seed| {
+                let (image, stopped_by) = render(&mut tracer, seed, &plan(u32::MAX, Some(target)));
+                assert_eq!(stopped_by, StopReason::TargetError);
+                assert!(image.estimate.error <= target);
+                image
+            })
+            .collect();
+        // A reference of other seeds.
+        let reference: Vec<Image> = (seeds..2 * seeds)
+            .map(|seed| render(&mut tracer, seed, &plan(if short_form() { 512 } else { 1024 }, None)).0)
+            .collect();
+        let errors = true_errors(&images.into_iter().chain(reference).collect::<Vec<_>>());
+        for (seed, error) in errors[..seeds as usize].iter().enumerate() {
+            println!("target {target}, seed {seed}: true error {error:.4}");
+            assert!((error / target - 1.0).abs() < 0.2, "target {target}, seed {seed}: {error}");
+        }
+    }
+}
+
+#[test]
+fn asking_for_the_error_does_not_change_a_bit() {
+    let mut tracer = gpu::path_tracer(&scene("cornell"), &gpu::settings(20, 12));
+    let film = |tracer: &mut PathTracer, plan: &RunPlan| {
+        tracer.run_plan(7, plan, &mut |_| ControlFlow::Continue(())).expect("the device works").film
+    };
+    let to_target = film(&mut tracer, &plan(u32::MAX, Some(0.1)));
+    let samples = to_target.pixels()[0].count;
+    assert!(samples > 64, "one look alone");
+    let plain = film(&mut tracer, &RunPlan { estimate: false, ..plan(samples, None) });
+    assert_eq!(plain, to_target);
+    assert_eq!(plain, film(&mut tracer, &plan(samples, None)));
+}
+
+#[test]
+fn a_limit_that_comes_first_ends_the_run() {
+    let mut tracer = gpu::path_tracer(&scene("cornell"), &gpu::settings(16, 16));
+    let (image, stopped_by) = render(&mut tracer, 1, &plan(100, Some(1e-3)));
+    assert_eq!((image.samples, stopped_by), (100, StopReason::Samples));
+    assert!(image.estimate.error > 1e-3);
+}
