@@ -47,14 +47,21 @@ pub struct Meeting {
     pub t: f64,
     /// Least distance from an edge, negative outside.
     pub margin: f64,
-    /// Bound on the distance between the f32 hit and the exact one, along the ray or across it.
+    /// Bound on how far the f32 test is off across the ray: by which side of an edge it passes.
     pub error: f64,
+    /// Bound on the distance between the f32 hit and the exact one, along the ray and in the triangle.
+    pub hit_error: f64,
     pub barycentric: [f64; 2],
 }
 
 /// Möller and Trumbore 1997, in f64. The f32 test subtracts the origin from the vertices and shears them (a handful of
 /// roundings of coordinates relative to the origin); a hit at a grazing angle moves by the inverse cosine of that. An
 /// instance's ray is rounded in object space, which counts as much as its matrix is badly conditioned.
+///
+/// Whether the ray passes is decided as if the sheared vertices were each off by that much (the signs of the edge functions
+/// are exact for them), so every edge moves by no more. Where it passes is the quotient of an edge function, off by that much
+/// times the longest edge L, and of the determinant, twice the projected area: the weights are off by error · L / 2A, and the
+/// point by L times that. L²/2A is 1.15 for an equilateral triangle and as large as a sliver is long for its width.
 pub fn meet(ray: &Ray, triangle: &Triangle) -> Option<Meeting> {
     let [a, b, c] = triangle.vertices;
     let (ab, ac) = (b - a, c - a);
@@ -76,7 +83,10 @@ pub fn meet(ray: &Ray, triangle: &Triangle) -> Option<Meeting> {
     let reach = [a, b, c].iter().map(|v| (*v - ray.origin).length()).fold(0.0, f64::max);
     let world = ray.origin.length() + reach;
     let error = ROUNDING * (24.0 * reach + 16.0 * triangle.condition * world) / cosine;
-    Some(Meeting { t, margin: margins.into_iter().fold(f64::INFINITY, f64::min), error, barycentric: [u, v] })
+    let longest = [ab, ac, c - b].iter().map(|edge| edge.length_squared()).fold(0.0, f64::max);
+    let hit_error = error * (longest / normal.length()).max(1.0);
+    let margin = margins.into_iter().fold(f64::INFINITY, f64::min);
+    Some(Meeting { t, margin, error, hit_error, barycentric: [u, v] })
 }
 
 /// Asserts that the hit is one that exact arithmetic allows: where it says, and with nothing certain in front of it.
@@ -88,26 +98,27 @@ pub fn check(triangles: &[Triangle], ray: &Ray, hit: &Hit) {
         .filter(|t| t.id != ray.from && t.id != ray.towards)
         .filter_map(|t| meet(ray, t).map(|m| (t, m)))
         .filter(|(_, m)| {
-            m.margin > -m.error && m.t * length > -m.error && (m.t - f64::from(ray.t_max)) * length < m.error
+            m.margin > -m.error && m.t * length > -m.hit_error && (m.t - f64::from(ray.t_max)) * length < m.hit_error
         })
         .collect();
-    let certain =
-        |m: &Meeting| m.margin > m.error && m.t * length > m.error && (f64::from(ray.t_max) - m.t) * length > m.error;
+    let certain = |m: &Meeting| {
+        m.margin > m.error && m.t * length > m.hit_error && (f64::from(ray.t_max) - m.t) * length > m.hit_error
+    };
     let mut nearest_allowed = f64::INFINITY;
     if hit.triangle != NO_TRIANGLE {
         let own = candidates.iter().find(|(t, _)| t.id == hit.triangle);
         let (triangle, own) = own.unwrap_or_else(|| panic!("that triangle is not there: {}", context()));
-        assert!((hit.t - own.t).abs() * length <= own.error, "t is {}: {}", own.t, context());
+        assert!((hit.t - own.t).abs() * length <= own.hit_error, "t is {}: {}", own.t, context());
         let [a, b, c] = triangle.vertices;
         let [u, v] = [0, 1].map(|i| hit.barycentric[i] - own.barycentric[i]);
-        assert!(((b - a) * u + (c - a) * v).length() <= own.error, "{:?}: {}", own.barycentric, context());
-        nearest_allowed = own.t * length - own.error;
+        assert!(((b - a) * u + (c - a) * v).length() <= own.hit_error, "{:?}: {}", own.barycentric, context());
+        nearest_allowed = own.t * length - own.hit_error;
     }
     if ray.any_hit && hit.triangle != NO_TRIANGLE {
         return;
     }
     for (triangle, m) in candidates.iter().filter(|(_, m)| certain(m)) {
-        let missed = m.t * length + m.error < nearest_allowed;
+        let missed = m.t * length + m.hit_error < nearest_allowed;
         assert!(!missed, "{:?} at {} was missed: {}", triangle.id, m.t, context());
     }
 }

@@ -184,13 +184,17 @@ pub fn rays_at_edges(mesh: &Primitive, place: &DAffine3, origin: DVec3, count: u
 
 /// A software driver's ray query (lavapipe 25: 0.4 % of the rays that are aimed at edges) misses where a box test rounds; our
 /// own traversal does not, and is what such a device renders with. Hardware must be watertight.
-pub fn driver_leaks() -> bool {
+pub fn is_leaky_driver() -> bool {
     let device = gpu::device();
-    let leaks = device.trace == TraceBackend::RayQuery && device.gpu.info.kind == DeviceKind::Cpu;
-    if leaks {
+    device.trace == TraceBackend::RayQuery && device.gpu.info.kind == DeviceKind::Cpu
+}
+
+/// [`is_leaky_driver`], said.
+pub fn driver_leaks() -> bool {
+    if is_leaky_driver() {
         eprintln!("skipped: the ray query of a software driver is not watertight");
     }
-    leaks
+    is_leaky_driver()
 }
 
 /// Random triangles, some of them slivers, some in pairs that share an edge.
