@@ -2,9 +2,12 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
+use super::coincident::SeenTriangles;
 use super::materials::{MaterialTable, MaterialUse};
 use super::{COORDINATE_LIMIT, PrepareError};
-use crate::layout::{LeafSlot, NONE, SLOT_LEAF, TRIANGLE_NORMALS, TRIANGLE_TEXCOORDS, Triangle, Vertex};
+use crate::layout::{
+    LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, SLOT_LEAF, TRIANGLE_NORMALS, TRIANGLE_TEXCOORDS, Triangle, Vertex,
+};
 use crate::scene::Primitive;
 
 /// The records of all meshes.
@@ -21,6 +24,8 @@ pub(super) struct MeshGeometry {
     pub(super) leaves: Vec<LeafSlot>,
     /// By [`LeafSlot::light`].
     pub(super) emissive: Vec<EmissiveTriangle>,
+    /// By which those given twice are known.
+    pub(super) seen: SeenTriangles,
 }
 
 /// A triangle that emits.
@@ -34,8 +39,9 @@ pub(super) struct EmissiveTriangle {
     pub(super) slot: u32,
 }
 
-/// Puts the triangles of a primitive, transformed, into `mesh`. Those without area cannot be hit and are left out; a
-/// mirroring transform would turn the winding around, so two corners change places.
+/// Puts the triangles of a primitive, transformed, into `mesh`. Those without area have no normal and are left out, and so
+/// are emissive ones that are there already; a mirroring transform would turn the winding around, so two corners change
+/// places.
 pub(super) fn add_primitive(
     primitive: &Primitive,
     transform: &DAffine3,
@@ -53,12 +59,16 @@ pub(super) fn add_primitive(
     }
     let mirrored = transform.matrix3.determinant() < 0.0;
     let map = materials.emission_map(used.record);
+    let double_sided = materials.records[used.record as usize].kind_flags & MATERIAL_DOUBLE_SIDED != 0;
     mesh.leaves.reserve(primitive.triangles.len());
     attributes.triangles.reserve(primitive.triangles.len());
     for &[a, b, c] in &primitive.triangles {
         let corners = if mirrored { [a, c, b] } else { [a, b, c] };
         let vertices = corners.map(|corner| positions[corner as usize]);
         if is_degenerate(vertices) {
+            continue;
+        }
+        if used.emissive && !mesh.seen.is_new(vertices, used.record, double_sided) {
             continue;
         }
         let mut light = NONE;

@@ -122,8 +122,11 @@ fn a_hole_is_noticed() {
     assert!(misses > rays / 10_000 && first != NONE, "{misses} of {rays} rays leave");
 }
 
+/// A name, and meshes with their placements.
+type NamedMeshes = (&'static str, Vec<(Primitive, Vec<DAffine3>)>);
+
 /// Meshes that make a traversal err: slivers, needles, triangles given twice, stacks of planes, a fan of a thousand to one.
-fn adversarial_meshes() -> Vec<(&'static str, Vec<(Primitive, Vec<DAffine3>)>)> {
+fn adversarial_meshes() -> Vec<NamedMeshes> {
     let identity = || vec![DAffine3::IDENTITY];
     let twice = |mut mesh: Primitive| {
         mesh.triangles.extend(mesh.triangles.clone());
