@@ -1,6 +1,6 @@
 //! Triangles of a primitive in the space they are traced in, with their shading attributes.
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3, Vec3Swizzles};
 
 use super::coincident::SeenTriangles;
 use super::materials::{MaterialTable, MaterialUse};
@@ -105,11 +105,16 @@ fn transform_positions(primitive: &Primitive, transform: &DAffine3) -> Option<Ve
         .collect()
 }
 
-/// Whether the triangle has no area. Differences of f32 vertices are exact or nearly so in f64, and so is their cross
-/// product: exactly zero means collinear.
+/// Whether the triangle has no area: corners on a line, in exact arithmetic (differences of f32 and their products are
+/// exact or nearly so in f64) or in that of the shader, which could not tell where its normal points
+/// (`surface_point` in shaders/include/geometry.glsl).
 fn is_degenerate(vertices: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = vertices.map(|v| Vec3::from(v).as_dvec3());
-    (b - a).cross(c - a) == DVec3::ZERO
+    let [a, b, c] = vertices.map(Vec3::from);
+    let (ab, ac) = (b - a, c - a);
+    let in_shader = ab.yzx() * ac.zxy() - ab.zxy() * ac.yzx();
+    let [a, b, c] = [a, b, c].map(|v| v.as_dvec3());
+    // A device may take denormals for zeros.
+    in_shader.abs().max_element() < f32::MIN_POSITIVE || (b - a).cross(c - a) == DVec3::ZERO
 }
 
 fn texcoord(primitive: &Primitive, corner: u32) -> [f32; 2] {

@@ -213,6 +213,29 @@ fn furnace_with_slivers_needles_and_triangles_of_no_area() {
     assert_reads_two("2000 degenerate triangles", &scene);
 }
 
+/// A lamp of slivers in one plane, of which f32 hardly knows where they face: what light it gives is finite, and a pixel
+/// of the room without it is not changed by more than it emits.
+#[test]
+fn lamps_that_are_slivers_give_finite_light() {
+    let mut random = Random(42);
+    let mut lamp = Primitive { material: 1, ..Primitive::default() };
+    for _ in 0..500 {
+        let (x, y) = (random.between(0.1, 0.9), random.between(0.1, 0.9));
+        let t = random.unit();
+        let first = lamp.positions.len() as u32;
+        let width = 10.0_f64.powf(random.between(-9.0, -6.0));
+        let corners = [(-x, -y), (x, y), (-x + 2.0 * t * x, -y + 2.0 * t * y + width)];
+        lamp.positions.extend(corners.map(|(x, y)| [x as f32, y as f32, -0.5]));
+        lamp.triangles.push([first, first + 1, first + 2]);
+    }
+    let identity = || vec![DAffine3::IDENTITY];
+    let mut scene = furnace(vec![(cube(2), identity()), (lamp, identity())], DAffine3::IDENTITY);
+    scene.materials.push(Material { emission: [1e3; 3], double_sided: true, ..Material::lambertian("lamp", [0.0; 3]) });
+    scene.materials[0].emission = [0.0; 3];
+    let settings = gpu::settings(32, 32);
+    gpu::run(&mut gpu::path_tracer(&scene, &settings), 1, 64);
+}
+
 /// A cube of one unit before the camera, in a room of ten million.
 #[test]
 fn furnace_with_sizes_ten_million_to_one() {
