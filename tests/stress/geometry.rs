@@ -233,7 +233,7 @@ fn lamps_that_are_slivers_give_finite_light() {
     scene.materials.push(Material { emission: [1e3; 3], double_sided: true, ..Material::lambertian("lamp", [0.0; 3]) });
     scene.materials[0].emission = [0.0; 3];
     let settings = gpu::settings(32, 32);
-    gpu::run(&mut gpu::path_tracer(&scene, &settings), 1, 64);
+    gpu::run(&mut gpu::path_tracer(&scene, &settings), 1, 16);
 }
 
 /// A cube of one unit before the camera, in a room of ten million.

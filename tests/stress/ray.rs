@@ -21,7 +21,7 @@ const RAYS_VARIABLE: &str = "SUNFLECK_STRESS_RAYS";
 fn watertight_rays() -> u64 {
     match std::env::var(RAYS_VARIABLE) {
         Ok(text) => text.parse().expect("SUNFLECK_STRESS_RAYS is a whole number"),
-        Err(_) if full_form() => 1 << 28,
+        Err(_) if full_form() => 1 << 27,
         Err(_) => 1 << 22,
     }
 }
