@@ -79,7 +79,7 @@ fn scale_free_scenes() -> &'static [&'static str] {
 }
 
 fn scales() -> &'static [f64] {
-    if full_form() { &[1e-6, 1e-4, 1e-2, 1e2, 1e4, 1e6] } else { &[1e-6, 1e6] }
+    if full_form() { &[1e-6, 1e-3, 1e3, 1e6] } else { &[1e-6, 1e6] }
 }
 
 /// An area light's radiance, and an environment's, know no length: a scene looks the same at every scale.
@@ -90,7 +90,8 @@ fn scaled_scenes_look_the_same() {
         for (series, scale) in scales().iter().enumerate() {
             let scaled = images(&placed(scene(name), *scale, DVec3::ZERO), 1 + series as u32);
             assert_same_image(&format!("{name}, nodes scaled by {scale:e}"), &original, &scaled);
-            if full_form() {
+            let extreme = *scale <= 1e-6 || *scale >= 1e6;
+            if full_form() && extreme {
                 let scaled = images(&with_scaled_vertices(scene(name), *scale as f32), 101 + series as u32);
                 assert_same_image(&format!("{name}, vertices scaled by {scale:e}"), &original, &scaled);
             }
