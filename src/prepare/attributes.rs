@@ -68,7 +68,8 @@ pub(super) fn add_primitive(
         if is_degenerate(vertices) {
             continue;
         }
-        if used.emissive && !mesh.seen.is_new(vertices, used.record, double_sided) {
+        // With a texture, its coordinates too would have to agree.
+        if used.emissive && map.is_none() && !mesh.seen.is_new(vertices, used.record, double_sided) {
             continue;
         }
         let mut light = NONE;

@@ -47,7 +47,7 @@ pub(super) fn gather(
     let mesh_bounds: Vec<DBounds> = scene.meshes.iter().map(bounds_of_mesh).collect();
     let mut geometry = Geometry { origin: origin(scene, &mesh_bounds, options.camera)?, ..Geometry::default() };
     let stays = which_stay(scene, options);
-    let repeated = which_repeat(scene);
+    let repeated = which_repeat(scene, materials);
     let placed = || scene.instances.iter().enumerate().filter(|(index, _)| !repeated[*index]);
     for (index, instance) in placed().filter(|(index, _)| !stays[*index]) {
         let mesh = &scene.meshes[instance.mesh];
@@ -104,11 +104,13 @@ fn which_stay(scene: &Scene, options: &PrepareOptions) -> Vec<bool> {
     can.iter().zip(&scene.instances).map(|(&can, instance)| can && uses[instance.mesh] >= 2).collect()
 }
 
-/// Which instances are one that came before once more, the same mesh at the same place: see [`super::coincident`].
-fn which_repeat(scene: &Scene) -> Vec<bool> {
+/// Which instances are a lamp that came before once more, the same mesh at the same place: see [`super::coincident`].
+fn which_repeat(scene: &Scene, materials: &MaterialTable) -> Vec<bool> {
     let mut seen = HashSet::new();
     let key = |m: &DAffine3| m.to_cols_array().map(|x| (x + 0.0).to_bits());
-    scene.instances.iter().map(|i| !seen.insert((i.mesh, key(&i.object_to_world)))).collect()
+    let emits = |mesh: &Mesh| mesh.primitives.iter().any(|p| materials.used(p.material).emissive);
+    let instances = scene.instances.iter();
+    instances.map(|i| emits(&scene.meshes[i.mesh]) && !seen.insert((i.mesh, key(&i.object_to_world)))).collect()
 }
 
 fn bounds_of_mesh(mesh: &Mesh) -> DBounds {
