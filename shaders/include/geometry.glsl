@@ -54,7 +54,8 @@ SurfacePoint surface_point(RenderConstants constants, TriangleVertices vertices,
         ab = transform_vector(m, ab);
         ac = transform_vector(m, ac);
     }
-    vec3 normal = cross(ab, ac);
+    // The cross product; preparation leaves out triangles of which these very operations make zero.
+    precise vec3 normal = ab.yzx * ac.zxy - ab.zxy * ac.yzx;
     float scale = max_component(abs(normal));
     vec3 scaled = normal / scale;
     float length_scaled = sqrt(dot(scaled, scaled));

@@ -1,5 +1,6 @@
 // Elementary functions whose error is known on every driver (Vulkan allows sin and cos 2^-11 and atan 4096 ulp), and
-// vectors that neither overflow nor vanish.
+// vectors that neither overflow nor vanish. What is relied on of a driver's float arithmetic is listed in
+// docs/accuracy/float-behaviour.md and tested by tests/stress/float_behaviour.rs.
 #ifndef MATH_GLSL
 #define MATH_GLSL
 

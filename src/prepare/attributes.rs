@@ -1,10 +1,13 @@
 //! Triangles of a primitive in the space they are traced in, with their shading attributes.
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3, Vec3Swizzles};
 
+use super::coincident::SeenTriangles;
 use super::materials::{MaterialTable, MaterialUse};
 use super::{COORDINATE_LIMIT, PrepareError};
-use crate::layout::{LeafSlot, NONE, SLOT_LEAF, TRIANGLE_NORMALS, TRIANGLE_TEXCOORDS, Triangle, Vertex};
+use crate::layout::{
+    LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, SLOT_LEAF, TRIANGLE_NORMALS, TRIANGLE_TEXCOORDS, Triangle, Vertex,
+};
 use crate::scene::Primitive;
 
 /// The records of all meshes.
@@ -21,6 +24,8 @@ pub(super) struct MeshGeometry {
     pub(super) leaves: Vec<LeafSlot>,
     /// By [`LeafSlot::light`].
     pub(super) emissive: Vec<EmissiveTriangle>,
+    /// By which those given twice are known.
+    pub(super) seen: SeenTriangles,
 }
 
 /// A triangle that emits.
@@ -34,8 +39,9 @@ pub(super) struct EmissiveTriangle {
     pub(super) slot: u32,
 }
 
-/// Puts the triangles of a primitive, transformed, into `mesh`. Those without area cannot be hit and are left out; a
-/// mirroring transform would turn the winding around, so two corners change places.
+/// Puts the triangles of a primitive, transformed, into `mesh`. Those without area have no normal and are left out, and so
+/// are emissive ones that are there already; a mirroring transform would turn the winding around, so two corners change
+/// places.
 pub(super) fn add_primitive(
     primitive: &Primitive,
     transform: &DAffine3,
@@ -53,12 +59,17 @@ pub(super) fn add_primitive(
     }
     let mirrored = transform.matrix3.determinant() < 0.0;
     let map = materials.emission_map(used.record);
+    let double_sided = materials.records[used.record as usize].kind_flags & MATERIAL_DOUBLE_SIDED != 0;
     mesh.leaves.reserve(primitive.triangles.len());
     attributes.triangles.reserve(primitive.triangles.len());
     for &[a, b, c] in &primitive.triangles {
         let corners = if mirrored { [a, c, b] } else { [a, b, c] };
         let vertices = corners.map(|corner| positions[corner as usize]);
         if is_degenerate(vertices) {
+            continue;
+        }
+        // With a texture, its coordinates too would have to agree.
+        if used.emissive && map.is_none() && !mesh.seen.is_new(vertices, used.record, double_sided) {
             continue;
         }
         let mut light = NONE;
@@ -95,11 +106,16 @@ fn transform_positions(primitive: &Primitive, transform: &DAffine3) -> Option<Ve
         .collect()
 }
 
-/// Whether the triangle has no area. Differences of f32 vertices are exact or nearly so in f64, and so is their cross
-/// product: exactly zero means collinear.
+/// Whether the triangle has no area: corners on a line, in exact arithmetic (differences of f32 and their products are
+/// exact or nearly so in f64) or in that of the shader, which could not tell where its normal points
+/// (`surface_point` in shaders/include/geometry.glsl).
 fn is_degenerate(vertices: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = vertices.map(|v| Vec3::from(v).as_dvec3());
-    (b - a).cross(c - a) == DVec3::ZERO
+    let [a, b, c] = vertices.map(Vec3::from);
+    let (ab, ac) = (b - a, c - a);
+    let in_shader = ab.yzx() * ac.zxy() - ab.zxy() * ac.yzx();
+    let [a, b, c] = [a, b, c].map(|v| v.as_dvec3());
+    // A device may take denormals for zeros.
+    in_shader.abs().max_element() < f32::MIN_POSITIVE || (b - a).cross(c - a) == DVec3::ZERO
 }
 
 fn texcoord(primitive: &Primitive, corner: u32) -> [f32; 2] {

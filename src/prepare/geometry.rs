@@ -1,5 +1,7 @@
 //! Places the scene's meshes: what is baked into the world, what stays an instance, and around which origin.
 
+use std::collections::HashSet;
+
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::attributes::{Attributes, MeshGeometry, add_primitive};
@@ -45,7 +47,9 @@ pub(super) fn gather(
     let mesh_bounds: Vec<DBounds> = scene.meshes.iter().map(bounds_of_mesh).collect();
     let mut geometry = Geometry { origin: origin(scene, &mesh_bounds, options.camera)?, ..Geometry::default() };
     let stays = which_stay(scene, options);
-    for (index, instance) in scene.instances.iter().enumerate().filter(|(index, _)| !stays[*index]) {
+    let repeated = which_repeat(scene, materials);
+    let placed = || scene.instances.iter().enumerate().filter(|(index, _)| !repeated[*index]);
+    for (index, instance) in placed().filter(|(index, _)| !stays[*index]) {
         let mesh = &scene.meshes[instance.mesh];
         // The error names what is being baked.
         geometry.world.name = if instance.name.is_empty() { mesh.name.clone() } else { instance.name.clone() };
@@ -56,7 +60,7 @@ pub(super) fn gather(
     }
     geometry.world.name = "world".to_owned();
     for (index, (mesh, bounds)) in scene.meshes.iter().zip(&mesh_bounds).enumerate() {
-        let users = scene.instances.iter().enumerate().filter(|(user, i)| stays[*user] && i.mesh == index);
+        let users = placed().filter(|(user, i)| stays[*user] && i.mesh == index);
         let center = recentring(bounds);
         let placements: Vec<Placement> = users
             .map(|(source, _)| Placement {
@@ -98,6 +102,15 @@ fn which_stay(scene: &Scene, options: &PrepareOptions) -> Vec<bool> {
         uses[instance.mesh] += usize::from(*can);
     }
     can.iter().zip(&scene.instances).map(|(&can, instance)| can && uses[instance.mesh] >= 2).collect()
+}
+
+/// Which instances are a lamp that came before once more, the same mesh at the same place: see [`super::coincident`].
+fn which_repeat(scene: &Scene, materials: &MaterialTable) -> Vec<bool> {
+    let mut seen = HashSet::new();
+    let key = |m: &DAffine3| m.to_cols_array().map(|x| (x + 0.0).to_bits());
+    let emits = |mesh: &Mesh| mesh.primitives.iter().any(|p| materials.used(p.material).emissive);
+    let instances = scene.instances.iter();
+    instances.map(|i| emits(&scene.meshes[i.mesh]) && !seen.insert((i.mesh, key(&i.object_to_world)))).collect()
 }
 
 fn bounds_of_mesh(mesh: &Mesh) -> DBounds {

@@ -7,6 +7,7 @@ pub mod bounds;
 pub mod bvh;
 mod camera;
 pub mod cdf;
+mod coincident;
 mod emission;
 pub mod environment;
 mod features;

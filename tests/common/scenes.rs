@@ -45,6 +45,11 @@ pub fn slow_driver() -> bool {
     short_form() && (is("SUNFLECK_TEST_DRIVER", "swiftshader") || is("SUNFLECK_TEST_TRACE", "ray-query"))
 }
 
+/// True where `make stress` runs the stress suite in full (SUNFLECK_STRESS=full); otherwise its tests take fewer cases.
+pub fn full_form() -> bool {
+    std::env::var("SUNFLECK_STRESS").is_ok_and(|form| form == "full")
+}
+
 /// Renders `seeds` independent images.
 pub fn seeds(tracer: &mut PathTracer, settings: &Settings, seeds: u32, spp: u32) -> TileStatistics {
     let mut statistics = TileStatistics::new(settings.width as usize, settings.height as usize, 8);

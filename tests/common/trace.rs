@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use sunfleck::gpu::{DeviceKind, TraceBackend};
 use sunfleck::scene::{Instance, Material, Mesh, Primitive, Scene};
 
 use super::gpu;
-use super::kernel::{TestKernel, empty_scene, floats, vector_texel};
+use super::kernel::{Random, TestKernel, empty_scene, floats, vector_texel};
 
 /// A slot and its instance.
 pub type TriangleId = [u32; 2];
@@ -159,4 +160,53 @@ pub fn cube(n: usize) -> Primitive {
         }
     }
     closed(&points, &faces)
+}
+
+/// Rays from inside a mesh of the given placement at its vertices and at points of its edges, the rest anywhere.
+pub fn rays_at_edges(mesh: &Primitive, place: &DAffine3, origin: DVec3, count: usize) -> Vec<Ray> {
+    let mut random = Random(23);
+    let corner = |i: u32| Vec3::from(mesh.positions[i as usize]).as_dvec3();
+    let mut ray = |i: usize| {
+        let [a, b, c] = mesh.triangles[random.below(mesh.triangles.len())].map(corner);
+        let target = match i % 4 {
+            0 => a,
+            1 => 0.5 * (b + c),
+            2 => b.lerp(c, random.unit()),
+            _ => a.lerp(b, random.unit()).lerp(c, random.unit()),
+        };
+        let world = |p: DVec3| (place.transform_point3(p) - origin).as_vec3();
+        let (from, to) = (world(random.point(0.4)), world(target));
+        let direction = (to - from).as_dvec3();
+        Ray::new(from.as_dvec3(), if i.is_multiple_of(3) { direction } else { direction.normalize() })
+    };
+    (0..count).map(&mut ray).collect()
+}
+
+/// A software driver's ray query (lavapipe 25: 0.4 % of the rays that are aimed at edges) misses where a box test rounds; our
+/// own traversal does not, and is what such a device renders with. Hardware must be watertight.
+pub fn is_leaky_driver() -> bool {
+    let device = gpu::device();
+    device.trace == TraceBackend::RayQuery && device.gpu.info.kind == DeviceKind::Cpu
+}
+
+/// [`is_leaky_driver`], said.
+pub fn driver_leaks() -> bool {
+    if is_leaky_driver() {
+        eprintln!("skipped: the ray query of a software driver is not watertight");
+    }
+    is_leaky_driver()
+}
+
+/// Random triangles, some of them slivers, some in pairs that share an edge.
+pub fn soup(random: &mut Random, pairs: usize) -> Primitive {
+    let mut soup = Primitive::default();
+    for _ in 0..pairs {
+        let at = random.point(2.0);
+        let width = 10.0_f64.powf(random.between(-5.0, 0.0));
+        let corners = [at, at + random.direction(), at + width * random.direction(), at + 0.5 * random.direction()];
+        let first = soup.positions.len() as u32;
+        soup.positions.extend(corners.map(|v| v.as_vec3().to_array()));
+        soup.triangles.extend([[first, first + 1, first + 2], [first + 1, first, first + 3]]);
+    }
+    soup
 }

@@ -1,42 +1,10 @@
 //! No ray leaves a closed mesh, and a ray that is no ray hits nothing.
 
-use crate::common::gpu;
-use crate::common::kernel::Random;
-use crate::common::trace::{NO_TRIANGLE, Ray, cube, icosphere, kernel, placements, scene_of, trace};
-use glam::{DAffine3, DVec3, Vec3};
-use sunfleck::gpu::{DeviceKind, TraceBackend};
+use crate::common::trace::{
+    NO_TRIANGLE, Ray, cube, driver_leaks, icosphere, kernel, placements, rays_at_edges, scene_of, trace,
+};
+use glam::{DAffine3, DVec3};
 use sunfleck::scene::Primitive;
-
-/// Rays from inside a mesh of the given placement at its vertices and at points of its edges, the rest anywhere.
-fn rays_at_edges(mesh: &Primitive, place: &DAffine3, origin: DVec3, count: usize) -> Vec<Ray> {
-    let mut random = Random(23);
-    let corner = |i: u32| Vec3::from(mesh.positions[i as usize]).as_dvec3();
-    let mut ray = |i: usize| {
-        let [a, b, c] = mesh.triangles[random.below(mesh.triangles.len())].map(corner);
-        let target = match i % 4 {
-            0 => a,
-            1 => 0.5 * (b + c),
-            2 => b.lerp(c, random.unit()),
-            _ => a.lerp(b, random.unit()).lerp(c, random.unit()),
-        };
-        let world = |p: DVec3| (place.transform_point3(p) - origin).as_vec3();
-        let (from, to) = (world(random.point(0.4)), world(target));
-        let direction = (to - from).as_dvec3();
-        Ray::new(from.as_dvec3(), if i.is_multiple_of(3) { direction } else { direction.normalize() })
-    };
-    (0..count).map(&mut ray).collect()
-}
-
-/// A software driver's ray query (lavapipe 25: 0.4 % of the rays that are aimed at edges) misses where a box test rounds; our
-/// own traversal does not, and is what such a device renders with. Hardware must be watertight.
-fn driver_leaks() -> bool {
-    let device = gpu::device();
-    let leaks = device.trace == TraceBackend::RayQuery && device.gpu.info.kind == DeviceKind::Cpu;
-    if leaks {
-        eprintln!("skipped: the ray query of a software driver is not watertight");
-    }
-    leaks
-}
 
 #[test]
 fn closed_meshes_are_watertight() {
