@@ -38,6 +38,11 @@ pub fn short_form() -> bool {
     std::env::var("SUNFLECK_TEST_DRIVER").is_ok_and(|driver| driver != "system")
 }
 
+/// True where the stress suite runs in full (`make stress`); otherwise it takes fewer scenes and samples.
+pub fn full_form() -> bool {
+    std::env::var("SUNFLECK_STRESS").is_ok_and(|form| form == "full")
+}
+
 /// True where rendering is slower by an order of magnitude (SwiftShader, and the ray queries of a software driver);
 /// statistical tests then take fewer samples still.
 pub fn slow_driver() -> bool {
