@@ -1,5 +1,5 @@
 # The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
-.PHONY: help deps build demo test test-drivers lint references clean
+.PHONY: help deps build demo test test-drivers stress lint references clean
 .DEFAULT_GOAL := help
 
 help: ## lists these commands
@@ -23,6 +23,9 @@ test: deps ## builds and runs every test on the device of this machine
 
 test-drivers: deps ## runs the tests of the GPU on lavapipe 22, lavapipe 25 (both back ends) and SwiftShader
 	@scripts/test-drivers.sh
+
+stress: deps ## the numerical stability suite in full (some twenty minutes on two cores)
+	SUNFLECK_STRESS=full cargo test --test stress -- --nocapture
 
 lint: deps ## formatting, clippy and the documentation's links
 	cargo fmt --check

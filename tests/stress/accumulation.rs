@@ -88,7 +88,10 @@ fn many_samples_do_not_drift_on_the_host() {
     let bound = 3.0 * f64::from(blocks + 32) * F64 * exact_mean * exact_mean * 12.0;
     let error = (variance / exact_variance - 1.0).abs();
     assert!(error <= bound, "variance {variance:e}, exact {exact_variance:e}");
-    println!("2^24 samples on the host: mean {:.1e}, variance {error:.1e} (bound {bound:.1e})", mean / exact_mean - 1.0);
+    println!(
+        "2^24 samples on the host: mean {:.1e}, variance {error:.1e} (bound {bound:.1e})",
+        mean / exact_mean - 1.0
+    );
 }
 
 /// Steps from one float to the next between two floats that are not negative.

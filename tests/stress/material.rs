@@ -57,7 +57,8 @@ fn ball(scale: f64, centre: DVec3, material: usize) -> Primitive {
 #[test]
 fn white_glass_of_any_index_loses_nothing() {
     for ior in [1.0, 1.0 + 1e-7, 0.5, 100.0] {
-        for bsdf in [Bsdf::Refract, Bsdf::Glass] {
+        let kinds: &[Bsdf] = if full_form() { &[Bsdf::Glass, Bsdf::Refract] } else { &[Bsdf::Glass] };
+        for bsdf in kinds.iter().copied() {
             let scene = furnace(vec![ball(1.0, DVec3::ZERO, 0)], vec![material(bsdf, 1.0, ior)]);
             assert_white(&format!("{bsdf:?} of index {ior}"), &scene, 64);
         }
@@ -116,12 +117,17 @@ fn albedo(material: Material, cosine: f64) -> Estimate {
 fn roughness_from_zero_to_one_is_finite_and_bounded() {
     let roughnesses: &[f32] =
         if full_form() { &[0.0, 0.0156, 0.015625, 0.03, 0.1, 0.3, 0.7, 1.0] } else { &[0.0, 0.015625, 1.0] };
-    let cosines: &[f64] = if full_form() { &[1.0, 0.3, 0.03, 0.003] } else { &[1.0, 0.003] };
+    let cosines: &[f64] = if full_form() { &[1.0, 0.3, 0.03, 0.003] } else { &[0.03] };
     for roughness in roughnesses.iter().copied() {
         for (metallic, most) in [(1.0, 1.0), (0.0, 2.0 - 0.04)] {
             for cosine in cosines.iter().copied() {
-                let mean = albedo(Material { roughness, metallic, ..material(Bsdf::MetallicRoughness, 1.0, 1.5) }, cosine);
-                println!("roughness {roughness}, metallic {metallic}, cosine {cosine}: {:.5} ± {:.1e}", mean.mean, mean.standard_error());
+                let mean =
+                    albedo(Material { roughness, metallic, ..material(Bsdf::MetallicRoughness, 1.0, 1.5) }, cosine);
+                println!(
+                    "roughness {roughness}, metallic {metallic}, cosine {cosine}: {:.5} ± {:.1e}",
+                    mean.mean,
+                    mean.standard_error()
+                );
                 assert!(mean.mean > 0.0 && mean.mean <= most + 4.0 * mean.standard_error() + 1e-5, "{mean:?}");
             }
         }
@@ -132,7 +138,8 @@ fn roughness_from_zero_to_one_is_finite_and_bounded() {
 /// pdf, so what rounding does to the pdf shows as a loss or gain of light. A mirror-like metal has albedo 1.
 #[test]
 fn narrowest_lobe_at_grazing_angles() {
-    for cosine in [0.1, 0.01, 0.003, 0.001] {
+    let cosines: &[f64] = if full_form() { &[0.1, 0.01, 0.003, 0.001] } else { &[0.01] };
+    for cosine in cosines.iter().copied() {
         let metal = Material { roughness: 0.015625, metallic: 1.0, ..material(Bsdf::MetallicRoughness, 1.0, 1.5) };
         let mean = albedo(metal, cosine);
         println!("alpha 2^-12, cosine {cosine}: {:.6} ± {:.1e}", mean.mean, mean.standard_error());
@@ -146,7 +153,7 @@ fn narrowest_lobe_at_grazing_angles() {
 #[test]
 fn black_is_black() {
     let kinds = [Bsdf::Lambertian, Bsdf::Mirror, Bsdf::Refract, Bsdf::Glass];
-    for bsdf in kinds {
+    for bsdf in kinds.into_iter().skip(if full_form() { 0 } else { 3 }) {
         let mut black = furnace(vec![ball(1.0, DVec3::ZERO, 0)], vec![material(bsdf, 0.0, 1.5)]);
         black.cameras = vec![camera(DVec3::Z * 4.0, DVec3::ZERO, 0.2)];
         let film = gpu::run(&mut gpu::path_tracer(&black, &settings(8)), 0, 64).film;
@@ -157,7 +164,9 @@ fn black_is_black() {
 /// Colours of 1e-6, twice through a slab: 1e-12 exactly, for the path is too short for roulette. 1e6 is refused.
 #[test]
 fn colours_next_to_black_and_beyond_white() {
-    let mut slab = furnace(vec![trace::cube(1)], vec![material(Bsdf::Refract, 1e-6, 1.5)]);
+    let near = rectangle(DVec3::new(-1.0, -1.0, 0.5), DVec3::X * 2.0, DVec3::Y * 2.0, 0);
+    let far = rectangle(DVec3::new(-1.0, -1.0, -0.5), DVec3::Y * 2.0, DVec3::X * 2.0, 0);
+    let mut slab = furnace(vec![near, far], vec![material(Bsdf::Refract, 1e-6, 1.5)]);
     slab.cameras = vec![camera(DVec3::Z * 4.0, DVec3::ZERO, 0.1)];
     let film = gpu::run(&mut gpu::path_tracer(&slab, &settings(8)), 0, 64).film;
     for pixel in film.radiance() {
@@ -174,14 +183,14 @@ fn colours_next_to_black_and_beyond_white() {
 #[test]
 fn ten_thousand_bounces_lose_nothing() {
     let white = Material::lambertian("white", [1.0; 3]);
-    let lamp = Material { emission: [1.0; 3], ..Material::lambertian("lamp", [0.0; 3]) };
+    let lamp = Material { emission: [1.0; 3], double_sided: true, ..Material::lambertian("lamp", [0.0; 3]) };
     // One square of 4 × 4 on one of six faces shines.
     let mut walls = trace::cube(4);
-    let shining = Primitive { triangles: walls.triangles.split_off(walls.triangles.len() - 2), material: 1, ..walls.clone() };
+    let shining =
+        Primitive { triangles: walls.triangles.split_off(walls.triangles.len() - 2), material: 1, ..walls.clone() };
     let camera = camera(DVec3::ZERO, DVec3::new(-1.0, 0.2, 0.1), 1.0);
     let scene = scene(vec![walls, shining], vec![white, lamp], camera);
-    let settings =
-        Settings { max_bounces: Some(10_000), light_sampling: LightSampling::Bsdf, ..gpu::settings(16, 16) };
+    let settings = Settings { max_bounces: Some(10_000), light_sampling: LightSampling::Bsdf, ..gpu::settings(16, 16) };
     let spp = if full_form() { 64 } else { 8 };
     let mut tracer = gpu::path_tracer(&scene, &settings);
     let rays = gpu::run(&mut tracer, 99, 1).rays;
