@@ -135,18 +135,19 @@ fn roughness_from_zero_to_one_is_finite_and_bounded() {
 }
 
 /// The narrowest lobe that is not a delta, seen ever more from the side: light sampling and BSDF sampling share it by the
-/// pdf, so what rounding does to the pdf shows as a loss or gain of light. A mirror-like metal has albedo 1.
+/// pdf, so what rounding does to the pdf would show as a loss or gain of light. The albedo is that of the model in f64 (the
+/// same distribution of visible normals, weight G2/G1, 150,000 samples): what reflects below the horizon is lost.
 #[test]
 fn narrowest_lobe_at_grazing_angles() {
-    let cosines: &[f64] = if full_form() { &[0.1, 0.01, 0.003, 0.001] } else { &[0.01] };
-    for cosine in cosines.iter().copied() {
+    let exact =
+        [(0.01, 0.999_670, 3.4e-5), (0.1, 0.999_999, 1e-6), (0.003, 0.996_190, 1.1e-4), (0.001, 0.966_271, 3.1e-4)];
+    for (cosine, model, model_error) in exact.into_iter().take(if full_form() { 4 } else { 1 }) {
         let metal = Material { roughness: 0.015625, metallic: 1.0, ..material(Bsdf::MetallicRoughness, 1.0, 1.5) };
         let mean = albedo(metal, cosine);
-        println!("alpha 2^-12, cosine {cosine}: {:.6} ± {:.1e}", mean.mean, mean.standard_error());
-        // The half vector's slope is known to 2^-23/cosine, ln D changes with it by 2/α at most; and α/cosine of the lobe is
-        // below the horizon.
-        let bound = 2.0 * 4096.0 * 0.5_f64.powi(23) / cosine + 0.5 / 4096.0 / cosine;
-        assert!((mean.mean - 1.0).abs() <= bound + 4.0 * mean.standard_error(), "{mean:?}, bound {bound}");
+        let error = mean.standard_error();
+        println!("alpha 2^-12, cosine {cosine}: {:.6} ± {error:.1e}, the model {model} ± {model_error:.1e}", mean.mean);
+        // Eight seeds: Student's t at level 0.01/4 with seven degrees of freedom is 4.5; and f32's rounding of a weight.
+        assert!((mean.mean - model).abs() <= 4.5 * error.hypot(model_error) + 2e-5, "{mean:?} and {model}");
     }
 }
 
