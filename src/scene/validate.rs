@@ -138,7 +138,9 @@ impl Check<'_> {
                 self.that(fits, "environment", "the number of texels is not width × height, or the image is empty")?;
                 self.that(texels.iter().all(valid), "environment", "a texel is negative or not finite")?;
                 let scale_is_valid = *strength >= 0.0 && strength.is_finite() && rotation_radians.is_finite();
-                self.that(scale_is_valid, "environment", "the strength or the rotation is out of range")
+                self.that(scale_is_valid, "environment", "the strength or the rotation is out of range")?;
+                let fits = texels.iter().flatten().all(|&l| (l * strength).is_finite());
+                self.that(fits, "environment", "a texel times the strength is not finite")
             }
         }
     }

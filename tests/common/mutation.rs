@@ -55,7 +55,8 @@ fn write_mutated(folder: &Path, mutation: &Mutation) {
     });
 }
 
-fn write_sources(folder: &Path, edit: impl Fn(&str, &str) -> String) {
+/// Writes the shader sources under test to a folder, each edited by (name, text).
+pub fn write_sources(folder: &Path, edit: impl Fn(&str, &str) -> String) {
     for (name, text) in gpu::sources() {
         let path = folder.join(name);
         std::fs::create_dir_all(path.parent().expect("a folder")).expect("the scratch folder is writable");

@@ -38,16 +38,16 @@ pub fn short_form() -> bool {
     std::env::var("SUNFLECK_TEST_DRIVER").is_ok_and(|driver| driver != "system")
 }
 
+/// True where the stress suite runs in full (`make stress`); otherwise it takes fewer scenes and samples.
+pub fn full_form() -> bool {
+    std::env::var("SUNFLECK_STRESS").is_ok_and(|form| form == "full")
+}
+
 /// True where rendering is slower by an order of magnitude (SwiftShader, and the ray queries of a software driver);
 /// statistical tests then take fewer samples still.
 pub fn slow_driver() -> bool {
     let is = |name: &str, value: &str| std::env::var(name).is_ok_and(|text| text == value);
     short_form() && (is("SUNFLECK_TEST_DRIVER", "swiftshader") || is("SUNFLECK_TEST_TRACE", "ray-query"))
-}
-
-/// True where `make stress` runs the stress suite in full (SUNFLECK_STRESS=full); otherwise its tests take fewer cases.
-pub fn full_form() -> bool {
-    std::env::var("SUNFLECK_STRESS").is_ok_and(|form| form == "full")
 }
 
 /// Renders `seeds` independent images.

@@ -6,39 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::common::assets::{collection, files};
 use sunfleck::scene::SceneError;
 use sunfleck::scene::load::{load_environment, load_scene};
 
 /// No file of the collection may take longer than this, in a barely optimised build on a busy machine.
 const LONGEST: Duration = Duration::from_secs(20);
-
-fn collection() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets");
-    let folder = std::env::var_os("SUNFLECK_ASSETS").map_or_else(beside, PathBuf::from);
-    if !folder.is_dir() {
-        eprintln!("{} is absent: real input is not tested (set SUNFLECK_ASSETS)", folder.display());
-        return None;
-    }
-    Some(folder)
-}
-
-/// The files below a folder that have one of the extensions, sorted.
-fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for path in fs::read_dir(folder).expect("the folder is readable").flatten().map(|entry| entry.path()) {
-            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-            if path.is_dir() {
-                folders.push(path);
-            } else if extensions.contains(&extension.as_str()) {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
-}
 
 /// Loads every file; returns those that do not load.
 fn load_all<T>(

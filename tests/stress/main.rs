@@ -4,7 +4,11 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod accumulation;
 mod float_behaviour;
 mod geometry;
+mod light;
+mod material;
 mod mutations;
 mod ray;
+mod real_input;

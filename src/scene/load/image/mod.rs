@@ -96,7 +96,7 @@ pub fn load_environment(path: &Path, strength: f32, rotation_degrees: f64) -> Sc
     let fail =
         |message: String| SceneError::file(path, message).hint("give a whole .hdr or .exr file, or a PNG or JPEG");
     let radiance = decode_radiance(&bytes).map_err(fail)?;
-    check_texels(path, &radiance)?;
+    check_texels(path, &radiance, strength)?;
     Ok(Environment::Image {
         name: path.display().to_string(),
         width: radiance.width,
@@ -128,13 +128,17 @@ fn srgb_to_linear(encoded: f64) -> f32 {
     linear as f32
 }
 
-/// Radiance is finite and not negative; anything else would poison the sampling of the whole map.
-fn check_texels(path: &Path, radiance: &Radiance) -> SceneResult<()> {
-    let bad = |texel: &[f32; 3]| !texel.iter().all(|&c| c >= 0.0 && c.is_finite());
+/// Radiance is finite and not negative, also times the strength; anything else would poison the sampling of the whole map.
+fn check_texels(path: &Path, radiance: &Radiance, strength: f32) -> SceneResult<()> {
+    let bad = |texel: &[f32; 3]| !texel.iter().all(|&c| c >= 0.0 && (c * strength).is_finite() && c.is_finite());
     let Some(first) = radiance.texels.iter().position(bad) else { return Ok(()) };
     let count = radiance.texels.iter().filter(|texel| bad(texel)).count();
     let (x, y) = (first % radiance.width as usize, first / radiance.width as usize);
     let [r, g, b] = radiance.texels[first];
+    if [r, g, b].iter().all(|&c| c >= 0.0 && c.is_finite()) {
+        let message = format!("{count} texels times the strength {strength} overflow; the first is ({r}, {g}, {b})");
+        return Err(SceneError::at(path, format!("texel ({x}, {y})"), message).hint("give a smaller strength"));
+    }
     let message = format!("{count} texels are negative, NaN or infinite; the first is ({r}, {g}, {b})");
     Err(SceneError::at(path, format!("texel ({x}, {y})"), message).hint("repair them in an image editor"))
 }
