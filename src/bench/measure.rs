@@ -146,11 +146,11 @@ pub fn measure(
     let reference = find_reference(open, scene, settings, plan, &mut work)?;
     let (mut tracer, prepare_seconds) = tracer(open, scene, settings)?;
     let mut mean = ImageAccumulator::new((settings.width, settings.height));
-    let mut points = Vec::new();
+    let mut runs: Vec<Vec<SeedRun>> = plan.spp.iter().map(|_| Vec::new()).collect();
     let mut render_seconds = 0.0;
-    for &spp in &plan.spp {
-        let mut runs = Vec::new();
-        for seed in (0..plan.seeds).map(|n| settings.seed.wrapping_add(n)) {
+    // All counts of one seed after the other, so that a drift of the machine's speed falls on every count.
+    for seed in (0..plan.seeds).map(|n| settings.seed.wrapping_add(n)) {
+        for (&spp, runs) in plan.spp.iter().zip(&mut runs) {
             let run = work.render(&mut tracer, seed, spp)?;
             let radiance = run.film.radiance();
             if Some(&spp) == plan.spp.last() {
@@ -159,8 +159,8 @@ pub fn measure(
             render_seconds += run.seconds;
             runs.push(SeedRun { seed, seconds: run.seconds, errors: reference.errors_of(&radiance) });
         }
-        points.push(Point::new(spp, runs));
     }
+    let points: Vec<_> = plan.spp.iter().zip(runs).map(|(&spp, runs)| Point::new(spp, runs)).collect();
     Ok(Measurement {
         device: open.gpu.info.name.clone(),
         driver: open.gpu.info.driver.clone(),
@@ -259,11 +259,7 @@ struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    fn new(
-        settings: &Settings,
-        plan: &Plan,
-        progress: &'a mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
-    ) -> Self {
+    fn new(settings: &Settings, plan: &Plan, progress: &'a mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>) -> Self {
         let reference = match plan.reference {
             ReferenceChoice::File(_) => 0,
             ReferenceChoice::Own(spp) => u64::from(spp.next_multiple_of(REFERENCE_PARTS)),

@@ -96,16 +96,18 @@ fn draw_chart<B: DrawingBackend>(
         .margin(16)
         .x_label_area_size(48)
         .y_label_area_size(84)
-        .build_cartesian_2d(x.clone().log_scale(), y.log_scale())?;
+        .build_cartesian_2d(
+            x.clone().log_scale().with_key_points(ticks(&x)),
+            y.clone().log_scale().with_key_points(ticks(&y)),
+        )?;
     chart
         .configure_mesh()
         .x_desc("render time in seconds")
         .y_desc("MSE without the reference's noise")
         .label_style(("sans-serif", 15))
-        .light_line_style(RGBColor(240, 240, 240))
-        .bold_line_style(RGBColor(215, 215, 215))
-        .x_label_formatter(&|value| format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').to_owned())
-        .y_label_formatter(&|value| format!("{value:.0e}"))
+        .bold_line_style(RGBColor(225, 225, 225))
+        .x_label_formatter(&label)
+        .y_label_formatter(&label)
         .draw()?;
     if let Some(law) = &measurement.mse_over_seconds {
         let (first, last) = (marks[0].seconds, marks[marks.len() - 1].seconds);
@@ -126,7 +128,8 @@ fn draw_chart<B: DrawingBackend>(
         .label(format!("mean of {} seeds ± 1 standard error", measurement.points[0].runs.len()))
         .legend(|(x, y)| Circle::new((x + 9, y), 4, POINTS.filled()));
     chart.draw_series(marks.iter().map(|mark| {
-        EmptyElement::at((mark.seconds, mark.mse)) + Text::new(format!("{} spp", mark.spp), (10, -18), ("sans-serif", 14))
+        EmptyElement::at((mark.seconds, mark.mse))
+            + Text::new(format!("{} spp", mark.spp), (10, -18), ("sans-serif", 14))
     }))?;
     chart
         .configure_series_labels()
@@ -143,4 +146,20 @@ fn draw_chart<B: DrawingBackend>(
 fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
     low / 1.4..high * 1.8
+}
+
+/// 1, 2 and 5 times the powers of ten in a range.
+fn ticks(range: &Range<f64>) -> Vec<f64> {
+    let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    let values = decades.flat_map(|decade| [1.0, 2.0, 5.0].map(|digit| digit * 10_f64.powi(decade)));
+    values.filter(|value| range.contains(value)).collect()
+}
+
+fn label(value: &f64) -> String {
+    if (0.01..1e4).contains(value) {
+        // Powers of ten carry rounding in their last digits.
+        format!("{}", (value * 1e3).round() / 1e3)
+    } else {
+        format!("{value:.0e}")
+    }
 }

@@ -95,13 +95,7 @@ impl Reference {
         reference
     }
 
-    fn new(
-        image: MeanImage,
-        description: String,
-        noise: String,
-        spp: Option<f64>,
-        seconds: Option<f64>,
-    ) -> Self {
+    fn new(image: MeanImage, description: String, noise: String, spp: Option<f64>, seconds: Option<f64>) -> Self {
         let mut sums = (0.0, 0.0, 0.0);
         for pixel in (0..image.mean.len()).filter(|&pixel| image.is_finite(pixel)) {
             for (mean, variance) in image.mean[pixel].iter().zip(image.variance[pixel]) {

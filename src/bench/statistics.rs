@@ -105,9 +105,8 @@ fn log_line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = points.len() as f64;
     let logs: Vec<_> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
     let (x_mean, y_mean) = logs.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / n, sum.1 + y / n));
-    let (xx, xy) = logs.iter().fold((0.0, 0.0), |sum, (x, y)| {
-        (sum.0 + (x - x_mean).powi(2), sum.1 + (x - x_mean) * (y - y_mean))
-    });
+    let (xx, xy) =
+        logs.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + (x - x_mean).powi(2), sum.1 + (x - x_mean) * (y - y_mean)));
     let (slope, intercept) = (xy / xx, y_mean - xy / xx * x_mean);
     (slope.is_finite() && intercept.is_finite()).then_some((slope, intercept))
 }

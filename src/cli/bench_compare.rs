@@ -55,7 +55,13 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<()> {
         };
         pairs.push(Pair { seed, a, b });
         if !args.quiet {
-            eprintln!("pair {} of {}: render {:.3} s and {:.3} s", n + 1, args.seeds, a.render_seconds, b.render_seconds);
+            eprintln!(
+                "pair {} of {}: render {:.3} s and {:.3} s",
+                n + 1,
+                args.seeds,
+                a.render_seconds,
+                b.render_seconds
+            );
         }
     }
     finish(args, &reference, sides, &pairs)
@@ -76,16 +82,22 @@ fn sides(args: &BenchArgs) -> Result<[Side; 2]> {
     let program = std::env::current_exe().map_err(|e| Error::io(Path::new("sunfleck"), "find this program", e))?;
     let flags = args.estimator.render_flags();
     let other = args.compare.as_deref().unwrap_or_default();
-    let side = |label, program, flags| {
-        Side { label, program, flags, mean: ImageAccumulator::new(args.resolution), report: Value::Null }
+    let side = |label, program, flags| Side {
+        label,
+        program,
+        flags,
+        mean: ImageAccumulator::new(args.resolution),
+        report: Value::Null,
     };
     let b = if other.trim_start().starts_with('-') {
-        let words = shlex::split(other).ok_or_else(|| Error::Usage(format!("--compare: a quote is open in '{other}'")))?;
+        let words =
+            shlex::split(other).ok_or_else(|| Error::Usage(format!("--compare: a quote is open in '{other}'")))?;
         side("B", program.clone(), overridden(&flags, words))
     } else if Path::new(other).is_file() {
         side("B", PathBuf::from(other), flags.clone())
     } else {
-        let message = format!("--compare: '{other}' is neither a program nor flags, as in --compare '--light-sampling bsdf'");
+        let message =
+            format!("--compare: '{other}' is neither a program nor flags, as in --compare '--light-sampling bsdf'");
         return Err(Error::Usage(message));
     };
     Ok([side("A", program, flags), b])

@@ -53,10 +53,7 @@ pub(super) fn text(heading: &str, m: &Measurement, start_up_seconds: f64) -> Str
 }
 
 fn header() -> String {
-    format!(
-        "{:>7} {:>18} {:>23} {:>23} {:>19} {:>11}",
-        "spp", "seconds", "MSE", "relMSE", "FLIP", "1/(MSE s)"
-    )
+    format!("{:>7} {:>18} {:>23} {:>23} {:>19} {:>11}", "spp", "seconds", "MSE", "relMSE", "FLIP", "1/(MSE s)")
 }
 
 fn row(point: &Point) -> String {
@@ -74,10 +71,13 @@ fn row(point: &Point) -> String {
 }
 
 fn slope(law: Option<&PowerLaw>) -> String {
-    law.map_or("no power law: an MSE is not above the reference's noise, or there is one count only".to_owned(), |law| {
-        let slope = law.slope;
-        format!("slope {:.4}, 95 % interval {:.4} to {:.4}", slope.estimate, slope.low, slope.high)
-    })
+    law.map_or(
+        "no power law: an MSE is not above the reference's noise, or there is one count only".to_owned(),
+        |law| {
+            let slope = law.slope;
+            format!("slope {:.4}, 95 % interval {:.4} to {:.4}", slope.estimate, slope.low, slope.high)
+        },
+    )
 }
 
 /// The verdict in words.

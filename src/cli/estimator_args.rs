@@ -125,10 +125,6 @@ impl EstimatorArgs {
         settings.trace = self.trace;
         settings.device = self.device;
         settings.shaders_dir = self.shaders;
-        Ok(EnvironmentArgs {
-            file: self.env,
-            strength: self.env_strength,
-            rotation_degrees: self.env_rotation,
-        })
+        Ok(EnvironmentArgs { file: self.env, strength: self.env_strength, rotation_degrees: self.env_rotation })
     }
 }
