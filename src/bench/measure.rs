@@ -1,7 +1,7 @@
 //! The renders of a bench: one kernel, every seed at every sample count, and their errors.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::Serialize;
@@ -209,7 +209,11 @@ fn find_reference(
     work: &mut Work,
 ) -> Result<Reference> {
     let spp = match &plan.reference {
-        ReferenceChoice::File(path) => return Reference::read(path, (settings.width, settings.height)),
+        ReferenceChoice::File(path) => {
+            let reference = Reference::read(path, (settings.width, settings.height))?;
+            let seed = reference.about.seed.filter(|seed| seed.wrapping_sub(settings.seed) < plan.seeds);
+            return seed.map_or(Ok(reference), |seed| Err(shared_seed(path, seed)));
+        }
         ReferenceChoice::Own(spp) => spp.div_ceil(REFERENCE_PARTS),
     };
     let other = other_estimator(settings);
@@ -229,6 +233,12 @@ fn find_reference(
         other.light_sampling
     );
     Ok(Reference::from_images(image.finish(), description, f64::from(total), seconds))
+}
+
+/// Equal seeds are equal random numbers: the errors would be those of images that know their reference.
+fn shared_seed(path: &Path, seed: u32) -> Error {
+    let path = path.display();
+    Error::Usage(format!("--reference: {path} has seed {seed}, as one of the images has; choose others by --seed"))
 }
 
 /// The kernel of the scene, and the seconds that preparing the scene took.

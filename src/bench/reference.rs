@@ -29,6 +29,8 @@ pub struct ReferenceInfo {
     pub description: String,
     /// How its noise is known, in words.
     pub noise: String,
+    /// Its seed, if it is a file that says so.
+    pub seed: Option<u32>,
     /// Samples per pixel; `None` if the file does not say.
     pub spp: Option<f64>,
     /// Seconds that rendering took; `None` for a file.
@@ -83,7 +85,9 @@ impl Reference {
             "the file has no variance layer: it is taken as exact, and nothing is subtracted"
         };
         let spp = file.metadata.samples_per_pixel.map(f64::from);
-        Ok(Self::new(image, path.display().to_string(), noise.to_owned(), spp, None))
+        let mut reference = Self::new(image, path.display().to_string(), noise.to_owned(), spp, None);
+        reference.about.seed = file.metadata.seed;
+        Ok(reference)
     }
 
     /// A reference from the mean of independent images.
@@ -107,6 +111,7 @@ impl Reference {
         let about = ReferenceInfo {
             description,
             noise,
+            seed: None,
             spp,
             seconds,
             noise_mse: sums.0 / sums.2,

@@ -141,7 +141,11 @@ pub(super) fn bench(args: &BenchArgs, name: &str) -> anyhow::Result<Report> {
     value["seconds"]["start_up"] = json!(ready.start_up_seconds);
     if let Some(folder) = &args.output {
         write_json(&folder.join(format!("{name}.json")), &value)?;
-        plot::draw(&measurement, &heading(args, name), &folder.join(format!("{name}.svg")))?;
+        if measurement.points.iter().any(|point| point.mse.mean > 0.0) {
+            plot::draw(&measurement, &heading(args, name), &folder.join(format!("{name}.svg")))?;
+        } else {
+            eprintln!("warning: no plot of {name}: no MSE is above the reference's noise");
+        }
     }
     Ok(Report { value, measurement })
 }

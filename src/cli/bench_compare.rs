@@ -137,7 +137,7 @@ impl Side {
 
     /// The error of a process, of the kind that its exit code stands for.
     fn failure(&self, code: Option<i32>, stderr: &str) -> Error {
-        let message = format!("side {} failed: {}", self.label, stderr.trim());
+        let message = format!("side {} failed: {}", self.label, stderr.trim().trim_start_matches("error: "));
         match code {
             Some(2) => Error::Usage(message),
             Some(4) => Error::Device(message),

@@ -31,6 +31,9 @@ pub(super) fn text(heading: &str, m: &Measurement, start_up_seconds: f64) -> Str
     let _ = writeln!(out, "  kernel     {}", m.kernel_key);
     let _ = writeln!(out, "  reference  {}", reference.description);
     let _ = writeln!(out, "             {}; MSE of its noise {:.3e}", reference.noise, reference.noise_mse);
+    if let Some(error) = reference.mse_standard_error {
+        let _ = writeln!(out, "             which shifts all MSEs below alike, by a standard error of {error:.1e}");
+    }
     let s = &m.seconds;
     let _ = writeln!(
         out,
