@@ -1,5 +1,5 @@
 # The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
-.PHONY: help deps build demo test test-drivers stress lint references clean
+.PHONY: help deps build demo bench bench-short test test-drivers stress lint references clean
 .DEFAULT_GOAL := help
 
 help: ## lists these commands
@@ -17,6 +17,12 @@ demo: build ## renders scenes/cornell_spheres.gltf to out/demo.exr and out/demo.
 	cargo run --release --quiet -- render scenes/cornell_spheres.gltf -o out/demo.exr -o out/demo.png \
 		--resolution 512x512 --spp 64 --exposure 1 --tonemap exponential
 	@ls -lh out/demo.exr out/demo.png
+
+bench: build ## measures run time against error on the standard suite, to out/bench (a quarter of an hour on two cores)
+	cargo run --release --quiet -- bench standard -o out/bench
+
+bench-short: build ## the same on the short suite (under a minute)
+	cargo run --release --quiet -- bench short -o out/bench-short --strict
 
 test: deps ## builds and runs every test on the device of this machine
 	cargo test

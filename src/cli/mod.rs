@@ -2,8 +2,12 @@
 //! `--json` alone.
 
 mod bench;
+mod bench_compare;
+mod bench_report;
+mod bench_suite;
 mod compare;
 mod devices;
+mod estimator_args;
 mod info;
 mod interrupt;
 mod merge;
@@ -48,7 +52,7 @@ enum Command {
     Info(info::InfoArgs),
     Compare(compare::CompareArgs),
     Merge(merge::MergeArgs),
-    Bench(bench::BenchArgs),
+    Bench(Box<bench::BenchArgs>),
     Watch(watch::WatchArgs),
 }
 
@@ -68,7 +72,8 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Info(args) => info::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Merge(args) => merge::run(&args),
-        Command::Bench(_) | Command::Watch(_) => unreachable!("refused as not built"),
+        Command::Bench(args) => bench::run(*args),
+        Command::Watch(_) => unreachable!("refused as not built"),
     }
 }
 

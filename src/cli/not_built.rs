@@ -4,27 +4,35 @@
 use sunfleck::render::{DeviceChoice, PixelFilter, SamplerKind};
 
 use super::Command;
+use super::estimator_args::EstimatorArgs;
 use super::render_args::RenderArgs;
 
 /// A flag or command by its name, and whether a command line uses it.
 type Entry = (&'static str, fn(&Command) -> bool);
 
 const NOT_BUILT: &[Entry] = &[
-    ("bench", |c| matches!(c, Command::Bench(_))),
     ("watch", |c| matches!(c, Command::Watch(_))),
     ("--aov", |c| render(c, |r| !r.aov.is_empty())),
     ("--denoise", |c| render(c, |r| r.denoise)),
     ("--checkpoint", |c| render(c, |r| r.checkpoint.is_some())),
     ("--resume", |c| render(c, |r| r.resume)),
-    ("--sampler sobol", |c| render(c, |r| r.sampler == SamplerKind::Sobol)),
+    ("--sampler sobol", |c| estimator(c, |e| e.sampler == SamplerKind::Sobol)),
     ("--filter tent", |c| render(c, |r| r.filter == PixelFilter::Tent)),
     ("--filter gaussian", |c| render(c, |r| r.filter == PixelFilter::Gaussian)),
     ("--filter blackman-harris", |c| render(c, |r| r.filter == PixelFilter::BlackmanHarris)),
-    ("--device all", |c| render(c, |r| r.device == DeviceChoice::All)),
+    ("--device all", |c| estimator(c, |e| e.device == DeviceChoice::All)),
 ];
 
 fn render(command: &Command, uses: fn(&RenderArgs) -> bool) -> bool {
     matches!(command, Command::Render(args) if uses(args))
+}
+
+fn estimator(command: &Command, uses: fn(&EstimatorArgs) -> bool) -> bool {
+    match command {
+        Command::Render(args) => uses(&args.estimator),
+        Command::Bench(args) => uses(&args.estimator),
+        _ => false,
+    }
 }
 
 /// A usage error that names what is asked for and not built; never is it ignored.

@@ -80,3 +80,17 @@ pub(crate) fn exposure_ev(text: &str) -> Result<f32, String> {
     let ev = finite(text)?;
     if ev.abs() <= 60.0 { Ok(ev as f32) } else { Err("expected exposure steps between -60 and 60".to_owned()) }
 }
+
+/// `MIN..MAX`, sample counts that double from MIN while they are not above MAX.
+pub(crate) fn doubling(text: &str) -> Result<Doubling, String> {
+    let ends = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let (min, max): (u32, u32) = ends.ok_or("expected MIN..MAX, sample counts that double, as in 4..64")?;
+    if min == 0 || min > max {
+        return Err("expected MIN..MAX with MIN at least 1 and not above MAX".to_owned());
+    }
+    Ok(Doubling(std::iter::successors(Some(min), |spp| spp.checked_mul(2)).take_while(|spp| *spp <= max).collect()))
+}
+
+/// Sample counts, ascending; at least one.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Doubling(pub(crate) Vec<u32>);

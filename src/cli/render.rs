@@ -14,15 +14,16 @@ use sunfleck::film::png::{tone_map_srgb8, write_png};
 use sunfleck::render::{RenderResult, Settings, StopReason, open_device, render_on};
 use sunfleck::scene::{Environment, Scene, load};
 
+use super::estimator_args::EnvironmentArgs;
 use super::progress::Progress;
-use super::render_args::{EnvironmentArgs, RenderJob};
+use super::render_args::RenderJob;
 use super::render_report::{print_summary, report};
 use super::{interrupt, print_json, print_warnings};
 
 /// Renders the job and writes its images.
 pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
     let loading = Instant::now();
-    let scene = load_scene(&job)?;
+    let scene = load_scene(&job.scene, &job.environment, job.quiet)?;
     let load_seconds = loading.elapsed().as_secs_f64();
     let device = open_device(&job.settings)?;
     if !job.quiet {
@@ -56,12 +57,12 @@ fn finish(job: &RenderJob, scene: &Scene, mut result: RenderResult) -> anyhow::R
 }
 
 /// The scene with the environment that the flags ask for, with a camera and with light.
-fn load_scene(job: &RenderJob) -> anyhow::Result<Scene> {
-    let mut scene = load::resolve(&job.scene).map_err(Error::from)?;
-    change_environment(&mut scene, &job.environment)?;
+pub(super) fn load_scene(name: &str, environment: &EnvironmentArgs, quiet: bool) -> anyhow::Result<Scene> {
+    let mut scene = load::resolve(name).map_err(Error::from)?;
+    change_environment(&mut scene, environment)?;
     scene.frame_if_no_camera();
     print_warnings(&scene.warnings);
-    if !job.quiet {
+    if !quiet {
         scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
     Ok(scene)

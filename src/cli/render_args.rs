@@ -7,11 +7,10 @@ use std::time::Duration;
 use clap::Args;
 use sunfleck::film::output::{ImageFormat, check_writable};
 use sunfleck::film::tonemap::ToneMap;
-use sunfleck::render::{
-    DeviceChoice, EnvSampling, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings, TraceChoice,
-};
+use sunfleck::render::{PixelFilter, Settings};
 use sunfleck::{Error, Result};
 
+use super::estimator_args::{EnvironmentArgs, EstimatorArgs};
 use super::parse;
 use super::tone_args::ToneArgs;
 
@@ -75,47 +74,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, help_heading = "How long")]
     pub(super) resume: bool,
 
-    /// Seed of the sampler: another seed, independent noise.
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Light transport")]
-    seed: u32,
-    /// Scattering events a path may have: 0 shows emitters alone, 1 adds direct light [default: unlimited].
-    #[arg(long, value_name = "N", help_heading = "Light transport")]
-    max_bounces: Option<u32>,
-    /// Which part of the light to add up; emission + direct + indirect = path.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<Integrator>(Integrator::NAMES), help_heading = "Light transport")]
-    integrator: Integrator,
-    /// Where the random numbers come from.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<SamplerKind>(SamplerKind::NAMES), help_heading = "Light transport")]
-    pub(super) sampler: SamplerKind,
-    /// How light is looked for: mis takes two samples, mixture one of the averaged pdf, nee and bsdf one strategy.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<LightSampling>(LightSampling::NAMES), help_heading = "Light transport")]
-    light_sampling: LightSampling,
-    /// How --light-sampling mis weighs its samples.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<MisHeuristic>(MisHeuristic::NAMES), help_heading = "Light transport")]
-    mis: MisHeuristic,
-
-    /// Image of the environment (.hdr or .exr, latitude/longitude), in place of the scene's.
-    #[arg(long, value_name = "FILE", help_heading = "Environment")]
-    env: Option<PathBuf>,
-    /// Factor on the environment's radiance.
-    #[arg(long, value_name = "X", default_value = "1", value_parser = parse::not_negative, help_heading = "Environment")]
-    env_strength: f32,
-    /// Rotation of the environment about +Y in degrees, counter-clockwise seen from above.
-    #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true, value_parser = parse::finite, help_heading = "Environment")]
-    env_rotation: f64,
-    /// How directions to the environment are chosen.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<EnvSampling>(EnvSampling::NAMES), help_heading = "Environment")]
-    env_sampling: EnvSampling,
-
-    /// Device to render on: a number or a part of a name (see `sunfleck devices`), all, or auto.
-    #[arg(long, value_name = "NAME|INDEX|all|auto", default_value_t, help_heading = "Device")]
-    pub(super) device: DeviceChoice,
-    /// How rays are traced: by hardware ray queries, by the shader's own BVH, or whichever the device has.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<TraceChoice>(TraceChoice::NAMES), help_heading = "Device")]
-    trace: TraceChoice,
-    /// Folder of shader sources to use in place of the built-in ones.
-    #[arg(long, value_name = "DIR", help_heading = "Device")]
-    shaders: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) estimator: EstimatorArgs,
 
     /// Estimate the error of the image from replicates, with an interval for it; needs 32 samples per pixel or more.
     #[arg(long, help_heading = "Reports")]
@@ -152,28 +112,14 @@ pub(crate) struct RenderJob {
     pub(crate) quiet: bool,
 }
 
-/// What the `--env` flags say.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct EnvironmentArgs {
-    /// Image in place of the scene's environment.
-    pub(crate) file: Option<PathBuf>,
-    /// Factor on the radiance of whichever environment there is.
-    pub(crate) strength: f32,
-    /// Rotation about +Y in degrees, added to the environment's own.
-    pub(crate) rotation_degrees: f64,
-}
-
 impl RenderArgs {
     /// The job, after every check that needs neither the scene nor a device.
     pub(crate) fn resolve(self) -> Result<RenderJob> {
         let outputs = self.checked_outputs()?;
-        if let Some(folder) = self.shaders.as_deref().filter(|folder| !folder.is_dir()) {
-            return Err(Error::Usage(format!("--shaders: '{}' is not a folder", folder.display())));
-        }
         let (width, height) = self.resolution;
         let without_limit =
             if self.time.is_some() || self.target_error.is_some() { u32::MAX } else { Settings::default().spp };
-        let settings = Settings {
+        let mut settings = Settings {
             width,
             height,
             spp: self.spp.unwrap_or(without_limit),
@@ -181,29 +127,17 @@ impl RenderArgs {
             target_error: self.target_error,
             estimate: self.estimate,
             sample_range: self.samples,
-            seed: self.seed,
-            max_bounces: self.max_bounces,
-            integrator: self.integrator,
-            sampler: self.sampler,
-            light_sampling: self.light_sampling,
-            mis_heuristic: self.mis,
-            env_sampling: self.env_sampling,
             filter: self.filter,
-            trace: self.trace,
-            device: self.device,
-            shaders_dir: self.shaders,
             camera: self.camera,
             strict: self.strict,
+            ..Settings::default()
         };
+        let environment = self.estimator.apply(&mut settings)?;
         Ok(RenderJob {
             scene: self.scene,
             outputs,
             settings,
-            environment: EnvironmentArgs {
-                file: self.env,
-                strength: self.env_strength,
-                rotation_degrees: self.env_rotation,
-            },
+            environment,
             exposure_ev: self.tone.exposure,
             tone_map: self.tone.tonemap,
             json: self.json,

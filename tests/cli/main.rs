@@ -1,4 +1,5 @@
 //! Tests of the program as people call it.
 
+mod bench;
 mod images;
 mod usage;

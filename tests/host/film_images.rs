@@ -39,6 +39,8 @@ fn metadata() -> Metadata {
         kernel_key: Some("bvh/w4/µ".to_owned()),
         scene: Some("cornell".to_owned()),
         integrator: Some("path".to_owned()),
+        estimated_error: Some(0.25),
+        estimated_error_interval: Some([0.125, 0.5]),
         device: Some("llvmpipe, 25.0".to_owned()),
         other: [("comment of the test".to_owned(), "größer".to_owned())].into(),
     }

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bench;
 mod film_images;
 mod film_metrics;
 mod film_sums;

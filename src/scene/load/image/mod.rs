@@ -168,10 +168,10 @@ mod tests {
     #[test]
     fn the_first_bad_texel_is_named() {
         let mut radiance = Radiance { width: 3, height: 2, texels: vec![[1.0; 3]; 6] };
-        assert!(check_texels(Path::new("map.exr"), &radiance).is_ok());
+        assert!(check_texels(Path::new("map.exr"), &radiance, 1.0).is_ok());
         radiance.texels[4] = [0.0, f32::NAN, 0.0];
         radiance.texels[5] = [-1.0, 0.0, 0.0];
-        let error = check_texels(Path::new("map.exr"), &radiance).expect_err("NaN is refused").to_string();
+        let error = check_texels(Path::new("map.exr"), &radiance, 1.0).expect_err("NaN is refused").to_string();
         assert!(error.contains("texel (1, 1)") && error.contains("2 texels"), "{error}");
     }
 }

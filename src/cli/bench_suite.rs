@@ -1,0 +1,127 @@
+//! Suites of `sunfleck bench`: a JSON file that lists scenes with flags.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Command, FromArgMatches};
+use serde::Deserialize;
+use serde_json::json;
+use sunfleck::Error;
+
+use super::bench::{BenchArgs, Report, bench, write_text};
+use super::bench_report::{bias, seconds};
+use super::print_json;
+
+/// A suite's file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Suite {
+    /// What it is for, in a sentence.
+    about: String,
+    benches: Vec<Entry>,
+}
+
+/// One bench of a suite.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    /// Names its files.
+    name: String,
+    /// A built-in scene, or a path from the suite's folder.
+    scene: String,
+    /// Flags of `sunfleck bench`.
+    #[serde(default)]
+    flags: Vec<String>,
+}
+
+/// The suite's file, if the argument names one: `*.json`, or a name in benches/suites below the current folder.
+pub(super) fn find(argument: &str) -> Option<PathBuf> {
+    if Path::new(argument).extension().is_some_and(|extension| extension == "json") {
+        return Some(argument.into());
+    }
+    let named = Path::new("benches/suites").join(format!("{argument}.json"));
+    (!argument.contains(['/', '\\']) && named.is_file()).then_some(named)
+}
+
+/// Runs every bench of the suite. `--output`, `--quiet` and `--strict` hold for all; everything else is the suite's.
+pub(super) fn run(path: &Path, args: &BenchArgs) -> anyhow::Result<()> {
+    if args.compare.is_some() {
+        return Err(Error::Usage("--compare takes a scene, not a suite".to_owned()).into());
+    }
+    let suite = read(path)?;
+    let benches: Result<Vec<_>, _> = suite.benches.iter().map(|entry| entry.arguments(path, args)).collect();
+    let mut reports = Vec::new();
+    for (entry, arguments) in suite.benches.iter().zip(benches?) {
+        reports.push((entry, bench(&arguments, &entry.name)?));
+    }
+    if let Some(folder) = &args.output {
+        write_text(&folder.join("README.md"), &index(path, &suite, &reports))?;
+    }
+    if args.json {
+        let values: Vec<_> = reports.iter().map(|(_, report)| &report.value).collect();
+        print_json(&json!({ "suite": path.display().to_string(), "benches": values }))?;
+    }
+    reports.iter().try_for_each(|(_, report)| report.verdict(args.strict)).map_err(anyhow::Error::from)
+}
+
+fn read(path: &Path) -> sunfleck::Result<Suite> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read this suite", e))?;
+    let suite: Suite = serde_json::from_str(&text).map_err(|e| Error::input(path, format!("is no suite: {e}")))?;
+    for (n, entry) in suite.benches.iter().enumerate() {
+        if entry.name.is_empty() || entry.name.contains(['/', '\\']) {
+            return Err(Error::input(path, format!("'{}' cannot name files", entry.name)));
+        }
+        if suite.benches[..n].iter().any(|other| other.name == entry.name) {
+            return Err(Error::input(path, format!("has two benches named '{}'", entry.name)));
+        }
+    }
+    Ok(suite)
+}
+
+impl Entry {
+    fn arguments(&self, suite: &Path, args: &BenchArgs) -> sunfleck::Result<BenchArgs> {
+        let command = BenchArgs::augment_args(Command::new("bench").no_binary_name(true));
+        let words = std::iter::once(&self.scene).chain(&self.flags);
+        let parsed = command.try_get_matches_from(words).and_then(|matches| BenchArgs::from_arg_matches(&matches));
+        let mut parsed = parsed.map_err(|e| Error::input(suite, format!("bench '{}': {e}", self.name)))?;
+        if Path::new(&self.scene).extension().is_some() {
+            let folder = suite.parent().unwrap_or(Path::new(""));
+            parsed.scene = folder.join(&self.scene).display().to_string();
+        }
+        parsed.output.clone_from(&args.output);
+        (parsed.quiet, parsed.strict) = (args.quiet, args.strict);
+        Ok(parsed)
+    }
+}
+
+/// The results as a page: a table, then the plots.
+fn index(path: &Path, suite: &Suite, reports: &[(&Entry, Report)]) -> String {
+    let mut page = format!("# Run time against error: {}\n\n{}\n", path.display(), suite.about);
+    if let Some((_, Report { measurement: m, .. })) = reports.first() {
+        let processor = m.processor.as_deref().unwrap_or("unknown processor");
+        let _ = writeln!(page, "\n{}; {}; {processor}.\n", m.device, m.driver);
+    }
+    page.push_str("| scene | spp | time | MSE | relMSE | FLIP | slope of MSE over spp | bias |\n");
+    page.push_str("|---|---|---|---|---|---|---|---|\n");
+    for (entry, Report { measurement: m, .. }) in reports {
+        let Some(point) = m.points.last() else { continue };
+        let flip = point.flip.map_or("–".to_owned(), |flip| format!("{:.4}", flip.mean));
+        let slope = m.mse_over_spp.map_or("none fits".to_owned(), |law| {
+            format!("{:.3} ({:.3} to {:.3})", law.slope.estimate, law.slope.low, law.slope.high)
+        });
+        let _ = writeln!(
+            page,
+            "| [{name}]({name}.json) | {} | {} | {:.3e} | {:.3e} | {flip} | {slope} | {} |",
+            point.spp,
+            seconds(&point.seconds),
+            point.mse.mean,
+            point.rel_mse.mean,
+            bias(&m.bias),
+            name = entry.name,
+        );
+    }
+    for (entry, _) in reports {
+        let _ = writeln!(page, "\n![{name}]({name}.svg)", name = entry.name);
+    }
+    page
+}
