@@ -127,17 +127,19 @@ def million() -> Scene:
 
 def plates() -> Scene:
     """After Veach 1997, figure 9.2: four lights of equal power, four metal plates from nearly a mirror to rough."""
-    scene = Scene("plates", "Glossy plates, lights of four sizes", (0, 2, 15), (0, -1.6, 2.0), 28, 4)
+    scene = Scene("plates", "Glossy plates, lights of four sizes", (0, 2, 15), (0, -2.6, 2.0), 36, 4)
     grey = Material("grey", colour=(0.4, 0.4, 0.4))
     scene.add(grey, rectangle((0, -5.5, 0), rotation("x", -90), (12, 12)))
     scene.add(grey, rectangle((0, 0, -4), None, (12, 12)))
+    # The lamps hang above the picture: seen directly, the edge of the smallest would be nearly all of the error.
+    row = numpy.array([0, 5, 0])
     for x, radius in zip((-3.75, -1.25, 1.25, 3.75), (0.03, 0.1, 0.3, 0.9)):
-        radiance = 2.0 / radius**2
+        radiance = 8.0 / radius**2
         lamp = Material(f"lamp of radius {radius}", colour=(0, 0, 0), emission=(radiance,) * 3)
-        scene.add(lamp, sphere((x, 0, 0), radius, n=16))
+        scene.add(lamp, sphere(row + (x, 0, 0), radius, n=16))
     for index, roughness in enumerate((0.08, 0.15, 0.25, 0.4)):
         centre = numpy.array([0, -2.2 - 0.75 * index, 0.4 + 1.35 * index])
-        normal = unit(unit(numpy.subtract(scene.position, centre)) + unit(-centre))
+        normal = unit(unit(numpy.subtract(scene.position, centre)) + unit(row - centre))
         turn = numpy.stack([(1, 0, 0), numpy.cross(normal, (1, 0, 0)), normal], axis=1)
         metal = Material(f"plate of roughness {roughness}", "metal", (0.7, 0.75, 0.8), roughness)
         scene.add(metal, rectangle(centre, turn, (4, 0.6)))
