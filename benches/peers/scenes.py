@@ -164,7 +164,7 @@ def sky(width=2048, height=1024, peak_to_mean=1e5) -> numpy.ndarray:
 
 
 def sun() -> Scene:
-    scene = Scene("sun", "Glossy and diffuse spheres under a sky with a sun", (0, 1.8, 6), (0, 0.6, 0), 32, 4)
+    scene = Scene("sun", "Glossy and diffuse spheres under a sky with a sun", (0, 1.8, 6), (0, 0.6, 0), 40, 4)
     scene.environment = sky()
     scene.add(Material("floor", colour=(0.5, 0.45, 0.4)), rectangle((0, 0, 0), rotation("x", -90), (6, 6)))
     scene.add(Material("gold", "metal", (0.9, 0.7, 0.3), 0.3), sphere((-1.3, 0.6, 0), 0.6))
