@@ -14,7 +14,7 @@ import bpy
 import numpy
 from mathutils import Matrix
 from scenes import SCENES
-from worker import serve
+from worker import REFERENCE_SEED, serve
 
 
 def nodes_of(tree):
@@ -153,6 +153,8 @@ class Cycles:
     def render(self, spp, seed):
         scene = bpy.context.scene
         scene.cycles.samples, scene.cycles.seed = spp, seed
+        # Sample 0 goes through the pixel's centre: a bias at edges, of weight 1/spp, which a reference must not have.
+        scene.cycles.sample_offset = 1 if seed >= REFERENCE_SEED else 0
         out = self.folder / f"cycles-{self.neutral.name}.exr"
         scene.render.filepath = str(out)
         ended = []

@@ -96,12 +96,13 @@ def measured(children, chosen) -> dict:
 
 def references(children, images, chosen) -> dict:
     from measure import Reference
+    from worker import REFERENCE_SEED
 
     parts = {name: [] for name in children}
     for index in range(chosen.parts):
         for name, child in children.items():
             spp = max(row["spp"] for row in images[name])
-            parts[name].append(child.render(spp, 500_000 + index)[0])
+            parts[name].append(child.render(spp, REFERENCE_SEED + index)[0])
     return {name: Reference(images_of_one) for name, images_of_one in parts.items()}
 
 

@@ -14,6 +14,8 @@ import time
 import numpy
 
 RESOLUTION = 256
+# Seeds from here on belong to references.
+REFERENCE_SEED = 500_000
 
 
 def serve(make_renderer, started: float) -> None:
