@@ -1,5 +1,5 @@
 # The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
-.PHONY: help deps build demo bench bench-short test test-drivers stress lint references clean
+.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short test test-drivers stress lint references clean
 .DEFAULT_GOAL := help
 
 help: ## lists these commands
@@ -40,6 +40,12 @@ lint: deps ## formatting, clippy and the documentation's links
 
 references: ## renders the reference images again with Mitsuba 3 (a quarter of an hour)
 	python3 tests/reference/make_references.py
+
+bench-peers: build ## time against error beside Mitsuba 3 and Cycles, six scenes (a quarter of an hour)
+	python3 benches/peers/run.py
+
+bench-peers-short: build ## the short form of it for CI: Mitsuba alone, one scene
+	python3 benches/peers/run.py --short
 
 clean: ## removes what was built and rendered
 	cargo clean

@@ -10,15 +10,15 @@ The script starts itself again inside a virtual environment with Mitsuba from Py
 """
 
 import argparse
-import glob
 import os
-import subprocess
 import sys
 import time
 import zlib
 from pathlib import Path
 
-MITSUBA = "3.9.1"
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+from python_environment import InstallationFailed, choose_mitsuba_variant, mitsuba_environment  # noqa: E402
+
 RESOLUTION = 256
 TILE = 8
 NO_ROULETTE = 1 << 20
@@ -26,37 +26,14 @@ NO_ROULETTE = 1 << 20
 PLAN = {0: (64, 256), 1: (64, 64), 2: (64, 64), 7: (64, 64), None: (64, 64)}
 
 
-def cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "sunfleck" / f"mitsuba-{MITSUBA}"
-
-
 def enter_environment() -> None:
     """Replaces this process by one in a virtual environment that has Mitsuba, made on the first call."""
-    folder = cache_folder()
-    python = folder / "bin" / "python"
-    if Path(sys.prefix) == folder:
-        return
-    if not (folder / "complete").exists():
-        print(f"installing mitsuba {MITSUBA} from PyPI into {folder}", file=sys.stderr)
-        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
-        subprocess.run([python, "-m", "pip", "install", "--quiet", f"mitsuba=={MITSUBA}", "numpy"], check=True)
-        (folder / "complete").touch()
-    os.execv(python, [str(python), os.path.abspath(__file__), *sys.argv[1:]])
-
-
-def choose_variant(mi) -> str:
-    """llvm_ad_rgb where a recent LLVM is found (older ones crash on recent processors), else the slow scalar_rgb."""
-    if "DRJIT_LIBLLVM_PATH" not in os.environ:
-        found = sorted(glob.glob("/usr/lib/*-linux-gnu/libLLVM.so.*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM.so.*"))
-        recent = [path for path in found if path.split(".so.")[1].split(".")[0].isdigit()
-                  and int(path.split(".so.")[1].split(".")[0]) >= 19]
-        if recent:
-            os.environ["DRJIT_LIBLLVM_PATH"] = recent[-1]
-    if "DRJIT_LIBLLVM_PATH" in os.environ and "llvm_ad_rgb" in mi.variants():
-        return "llvm_ad_rgb"
-    print("no LLVM 19 or newer (Debian: libllvm19): falling back to scalar_rgb, which is slow", file=sys.stderr)
-    return "scalar_rgb"
+    try:
+        python = mitsuba_environment()
+    except InstallationFailed as error:
+        sys.exit(f"error: {error}")
+    if Path(sys.prefix) != python.parent.parent:
+        os.execv(python, [str(python), os.path.abspath(__file__), *sys.argv[1:]])
 
 
 def integrator(mi, bounces):
@@ -131,7 +108,7 @@ def main() -> None:
     import mitsuba as mi
     import numpy
 
-    mi.set_variant(choose_variant(mi))
+    mi.set_variant(choose_mitsuba_variant(mi))
     print(f"Mitsuba {mi.__version__}, {mi.variant()}", file=sys.stderr)
     box = scene(mi)
     emitted_only = integrator(mi, 0)

@@ -46,7 +46,7 @@ fn render_real(path: &Path) -> Option<Run> {
     let settings = gpu::settings(SIDE, SIDE);
     let device = gpu::device();
     let camera = &scene.cameras[0];
-    let tracer = prepare_scene(&scene, camera, &settings).map_err(sunfleck::Error::from).and_then(|prepared| {
+    let tracer = prepare_scene(&scene, camera, &settings).and_then(|prepared| {
         PathTracer::new(&device.gpu, device.trace, &prepared, camera, &settings, BindingOverride::default())
     });
     match tracer {

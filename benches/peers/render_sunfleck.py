@@ -1,0 +1,54 @@
+"""Sunfleck's side: the scene as .gltf, and `sunfleck render --json` once a request; its own report gives the times."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import OpenEXR
+from gltf import write_gltf
+from scenes import SCENES
+from worker import serve
+
+BINARY = Path(__file__).resolve().parents[2] / "target" / "release" / "sunfleck"
+
+
+class Sunfleck:
+    def __init__(self):
+        self.version = subprocess.run([BINARY, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+
+    def prepare(self, name, folder, resolution, options):
+        self.folder, self.resolution = Path(folder), resolution
+        self.neutral = SCENES[name]()
+        self.file = write_gltf(self.neutral, self.folder)
+
+    def load(self):
+        """Nothing is kept between renderings: loading is part of each process, and reported with it."""
+
+    def render(self, spp, seed):
+        out = self.folder / f"sunfleck-{self.neutral.name}.exr"
+        command = [BINARY, "render", self.file, "-o", out, "--resolution", f"{self.resolution}x{self.resolution}",
+                   "--spp", str(spp), "--seed", str(seed), "--max-bounces", str(self.neutral.max_bounces),
+                   "--json", "--quiet", "--strict"]
+        if self.neutral.environment is not None:
+            command += ["--env", self.folder / f"{self.neutral.name}.hdr"]
+        before = time.perf_counter()
+        done = subprocess.run(command, capture_output=True, text=True)
+        wall = time.perf_counter() - before
+        if done.returncode != 0:
+            raise RuntimeError(f"{' '.join(map(str, command))} ended with {done.returncode}: {done.stderr}")
+        report = json.loads(done.stdout)
+        seconds = report["seconds"]
+        load = seconds["load"] + seconds["prepare"] + seconds["upload"]
+        start = wall - load - seconds["compile"] - seconds["render"]
+        self.version = f"{self.version.split(' on ')[0]} on {report['driver']}, trace {report['trace']}"
+        with OpenEXR.File(str(out)) as file:
+            image = file.channels()["RGB"].pixels
+        return image, {"start": start, "load": load, "compile": seconds["compile"], "render": seconds["render"],
+                       "version": self.version}
+
+
+if __name__ == "__main__":
+    serve(Sunfleck, float(sys.argv[1]))
