@@ -11,8 +11,9 @@ runs=${SUNFLECK_DRIVERS:-"mesa-22 mesa-25-bvh mesa-25-ray-query swiftshader"}
 
 scripts/drivers.sh
 
-# These test binaries touch a device; the others need no repetition.
-default=(--test gpu --test stress --test cli)
+# These test binaries touch a device; the others need no repetition, nor does the arithmetic of `bench`. The stress suite takes
+# a run of its own: scripts/test-drivers.sh --test stress.
+default=(--test gpu --test cli -- --skip bench::)
 cargo test --quiet --no-run "${@:-${default[@]}}"
 
 # Whether the device that is taken by default is lavapipe, and its library the one that drivers.sh fetched as mesa-22.

@@ -10,6 +10,7 @@ use super::bias::{BiasVerdict, find_bias};
 use super::mean_image::ImageAccumulator;
 use super::reference::{Errors, Reference, ReferenceInfo};
 use super::statistics::{PowerLaw, Summary, fit_power_law};
+use crate::layout::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE};
 use crate::render::{
     BindingOverride, LightSampling, OpenDevice, PathTracer, ProgressUpdate, Run, Seconds, Settings, StopReason,
     choose_camera, prepare_scene,
@@ -228,10 +229,13 @@ fn find_reference(
     }
     let total = u64::from(spp) * u64::from(REFERENCE_PARTS);
     let last_seed = first_seed.wrapping_add(REFERENCE_PARTS - 1);
-    let description = format!(
+    let mut description = format!(
         "own run with --light-sampling {}, {total} samples per pixel of seeds {first_seed} to {last_seed}",
         other.light_sampling
     );
+    if tracer.key().features.lights & (1 << LIGHT_TRIANGLE | 1 << LIGHT_ENVIRONMENT) == 0 {
+        description += " (no light here has an area: every light sampling is the same estimator)";
+    }
     Ok(Reference::from_images(image.finish(), description, total as f64, seconds))
 }
 

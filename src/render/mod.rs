@@ -7,7 +7,9 @@ mod open;
 mod path_tracer;
 mod progress;
 mod result;
+mod run;
 mod scene_buffers;
+mod schedule;
 mod settings;
 mod slices;
 
@@ -17,9 +19,10 @@ use std::time::Instant;
 pub use function_kernel::FunctionCall;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};
-pub use path_tracer::{BindingOverride, PathTracer, Run, RunPlan};
+pub use path_tracer::{BindingOverride, PathTracer};
 pub use progress::ProgressUpdate;
 pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
+pub use run::{Run, RunPlan};
 pub use scene_buffers::choose_array_form;
 pub use settings::{
     DeviceChoice, EnvSampling, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings,

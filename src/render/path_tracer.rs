@@ -10,15 +10,15 @@ use ash::vk::BufferUsageFlags as Usage;
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
-use super::slices::{SLICES_IN_FLIGHT, Slice, SliceOutcome, SliceSizes};
-use super::{Integrator, NonFiniteSample, ProgressUpdate, Settings, StopReason};
-use crate::film::Film;
+use super::schedule::Schedule;
+use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
+use super::{Integrator, ProgressUpdate, Run, RunPlan, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
 use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
     shader_compiler,
 };
-use crate::layout::{BLOCK_SAMPLES, BlockResult, RenderConstants, SliceConstants};
+use crate::layout::{RenderConstants, SliceConstants};
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
@@ -50,57 +50,6 @@ pub struct PathTracer {
     /// See `compile_seconds`.
     pub upload_seconds: f64,
 }
-
-/// What a run renders and what ends it.
-#[derive(Clone, Debug)]
-pub struct RunPlan {
-    /// Sample indices.
-    pub samples: Range<u32>,
-    /// Wall time after which the run ends.
-    pub time: Option<Duration>,
-    /// Relative error at which it ends.
-    pub target_error: Option<f64>,
-    /// Keep the sums of replicates, which an error estimate is made of; a target implies it.
-    pub estimate: bool,
-}
-
-impl RunPlan {
-    /// What the settings ask for.
-    pub fn new(settings: &Settings) -> Self {
-        Self {
-            samples: settings.samples(),
-            time: settings.time,
-            target_error: settings.target_error,
-            estimate: settings.estimate,
-        }
-    }
-}
-
-/// What a run of the kernel returns.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// The samples.
-    pub film: Film,
-    /// Which rule ended it.
-    pub stopped_by: StopReason,
-    /// The sums of replicates, if they were asked for.
-    pub replicates: Option<ReplicateSums>,
-    /// Rays traced.
-    pub rays: u64,
-    /// Paths traced.
-    pub paths: u64,
-    /// Samples that were NaN or infinite.
-    pub non_finite_samples: u64,
-    /// The first few of them.
-    pub first_non_finite: Vec<NonFiniteSample>,
-    /// Samples with a path that the cap on bounces cut off.
-    pub capped_samples: u64,
-    /// Wall time.
-    pub seconds: f64,
-}
-
-/// Non-finite samples whose place is kept.
-const REPORTED_NON_FINITE: usize = 16;
 
 impl PathTracer {
     /// Uploads the scene and compiles its kernel.
@@ -269,97 +218,6 @@ struct Limits {
     samples_total: Option<u64>,
 }
 
-/// Hands out the atoms of a run: block by block, each over all pixels.
-struct Schedule {
-    pixels: u64,
-    first_block: u32,
-    next_atom: u64,
-    atoms: u64,
-}
-
-impl Schedule {
-    fn new(constants: &RenderConstants) -> Self {
-        let pixels = padded_pixels(constants);
-        let first_block = constants.first_sample / BLOCK_SAMPLES;
-        let blocks = constants.end_sample.div_ceil(BLOCK_SAMPLES) - first_block;
-        Self { pixels, first_block, next_atom: 0, atoms: pixels * u64::from(blocks) }
-    }
-
-    fn is_done(&self) -> bool {
-        self.next_atom >= self.atoms
-    }
-
-    fn next(&mut self, lanes: u32, ray_budget: u32) -> SliceConstants {
-        let lanes = lanes.min(u32::try_from(self.atoms - self.next_atom).unwrap_or(u32::MAX));
-        let constants = SliceConstants {
-            first_atom: (self.next_atom % self.pixels) as u32,
-            lanes,
-            first_block: self.first_block + (self.next_atom / self.pixels) as u32,
-            ray_budget,
-            ..SliceConstants::default()
-        };
-        self.next_atom += u64::from(lanes);
-        constants
-    }
-}
-
-impl Run {
-    /// The first reason stays.
-    fn stop(&mut self, reason: StopReason) {
-        if self.stopped_by == StopReason::Samples {
-            self.stopped_by = reason;
-        }
-    }
-
-    fn new(constants: &RenderConstants, plan: &RunPlan) -> Self {
-        let film = Film::new(constants.width, constants.height);
-        let replicates = plan.estimate || plan.target_error.is_some();
-        Self {
-            replicates: replicates.then(|| ReplicateSums::new(film.pixels().len())),
-            film,
-            stopped_by: StopReason::Samples,
-            rays: 0,
-            paths: 0,
-            non_finite_samples: 0,
-            first_non_finite: Vec::new(),
-            capped_samples: 0,
-            seconds: 0.0,
-        }
-    }
-
-    fn add(&mut self, constants: &RenderConstants, outcome: &SliceOutcome, results: &[BlockResult]) {
-        let pixels = padded_pixels(constants);
-        for (result, lane) in results.iter().zip(0_u64..) {
-            if result.samples == 0 {
-                continue;
-            }
-            let atom = u64::from(outcome.constants.first_atom) + lane;
-            let (x, y) = pixel_of_index(constants, atom % pixels);
-            let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
-            let pixel = y as usize * constants.width as usize + x as usize;
-            let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
-            self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples);
-            if let Some(replicates) = &mut self.replicates {
-                replicates.add_block(pixel, block, sum, result.samples);
-            }
-            self.rays += u64::from(result.rays);
-            self.paths += u64::from(result.samples);
-            self.capped_samples += u64::from(result.capped.count_ones());
-            self.non_finite_samples += u64::from(result.non_finite.count_ones());
-            for bit in (0..BLOCK_SAMPLES).filter(|bit| result.non_finite >> bit & 1 == 1) {
-                if self.first_non_finite.len() < REPORTED_NON_FINITE {
-                    self.first_non_finite.push(NonFiniteSample { x, y, sample: block * BLOCK_SAMPLES + bit });
-                }
-            }
-        }
-    }
-}
-
-/// The low part of the sum; meaningless (NaN) where the sum itself is not finite.
-fn compensation(result: &BlockResult, channel: usize) -> f64 {
-    if result.sum[channel].is_finite() { f64::from(result.compensation[channel]) } else { 0.0 }
-}
-
 /// An integrator that adds nothing behind the first scattering events need not look there.
 fn effective_max_bounces(settings: &Settings) -> u32 {
     let needed = match settings.integrator {
@@ -368,20 +226,6 @@ fn effective_max_bounces(settings: &Settings) -> u32 {
         Integrator::Path | Integrator::Indirect => u32::MAX,
     };
     settings.max_bounces.unwrap_or(u32::MAX).min(needed)
-}
-
-/// Pixels of the film rounded up to whole 8×8 tiles.
-fn padded_pixels(constants: &RenderConstants) -> u64 {
-    u64::from(constants.width.div_ceil(8)) * u64::from(constants.height.div_ceil(8)) * 64
-}
-
-/// The pixel of an index, as `pixel_of_index` in shaders/include/lane.glsl.
-fn pixel_of_index(constants: &RenderConstants, index: u64) -> (u32, u32) {
-    let tiles_across = u64::from(constants.width.div_ceil(8));
-    let (tile, inside) = (index / 64, index % 64);
-    let x = tile % tiles_across * 8 + inside % 8;
-    let y = tile / tiles_across * 8 + inside / 8;
-    (u32::try_from(x).unwrap_or(u32::MAX), u32::try_from(y).unwrap_or(u32::MAX))
 }
 
 fn build_kernel(

@@ -59,35 +59,26 @@ fn emission_agrees() {
 #[test]
 fn one_bounce_agrees() {
     if !short_form() {
-        compare(Some(1), 8);
+        compare(Some(1), 4);
     }
 }
 
 #[test]
 fn two_bounces_agree() {
     if !short_form() {
-        compare(Some(2), 8);
+        compare(Some(2), 4);
     }
 }
 
 #[test]
 fn seven_bounces_agree() {
-    compare(
-        Some(7),
-        if slow_driver() {
-            2
-        } else if short_form() {
-            4
-        } else {
-            8
-        },
-    );
+    compare(Some(7), if slow_driver() { 2 } else { 4 });
 }
 
 #[test]
 fn unlimited_bounces_agree() {
     if !short_form() {
-        compare(None, 8);
+        compare(None, 4);
     }
 }
 

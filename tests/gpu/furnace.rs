@@ -13,7 +13,7 @@ fn settings(size: u32, light_sampling: LightSampling) -> Settings {
 fn assert_radiance(name: &str, light_sampling: LightSampling, radiance: f64, spp: u32) {
     let settings = settings(64, light_sampling);
     let mut tracer = gpu::path_tracer(&scene(name), &settings);
-    let statistics = scenes::seeds(&mut tracer, &settings, 16, if short_form() { spp / 4 } else { spp });
+    let statistics = scenes::seeds(&mut tracer, &settings, 16, if short_form() { spp / 2 } else { spp });
     for mean in statistics.image() {
         let error = 100.0 * mean.standard_error() / radiance;
         println!("{name}, {light_sampling}: {:.5} ± {error:.3} % (exact: {radiance})", mean.mean);
@@ -35,14 +35,14 @@ fn modes() -> &'static [LightSampling] {
 #[test]
 fn closed_box_of_albedo_one_half_has_radiance_two() {
     for mode in modes().iter().copied() {
-        assert_radiance("furnace_box", mode, 2.0, 32);
+        assert_radiance("furnace_box", mode, 2.0, 16);
     }
 }
 
 #[test]
 fn closed_box_of_albedo_four_fifths_has_radiance_five() {
     for mode in modes().iter().copied() {
-        assert_radiance("furnace_box_08", mode, 5.0, 64);
+        assert_radiance("furnace_box_08", mode, 5.0, 32);
     }
 }
 
@@ -50,7 +50,7 @@ fn closed_box_of_albedo_four_fifths_has_radiance_five() {
 fn white_spheres_vanish_before_a_white_environment() {
     for name in ["lambertian", "mirror", "refract", "glass"] {
         for mode in modes().iter().copied() {
-            assert_radiance(&format!("furnace_sphere_{name}"), mode, 1.0, 32);
+            assert_radiance(&format!("furnace_sphere_{name}"), mode, 1.0, 16);
         }
     }
 }
