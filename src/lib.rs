@@ -10,7 +10,7 @@
 //! | [`gpu`] | Vulkan behind small RAII types; the only module with `unsafe`, and it knows nothing of scenes |
 //! | [`render`] | what is asked for, the kernel for it, slices on a device, and the result |
 //! | [`film`] | sums of samples in f64; EXR and PNG, merging, error metrics; knows neither the GPU nor scenes |
-//! | [`bench`] | run time against error: repeated renders, their errors to a reference, slopes, verdicts, plots |
+//! | [`mod@bench`] | run time against error: repeated renders, their errors to a reference, slopes, verdicts, plots |
 //! | [`error`] | what can end a run, and the exit code each kind has |
 //!
 //! From a scene to an image, as `sunfleck render cornell -o cornell.exr` does it:

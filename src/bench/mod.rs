@@ -4,7 +4,7 @@
 //! | file | subject |
 //! |---|---|
 //! | [`measure`] | the renders, and what they come to |
-//! | [`reference`] | what is measured against: a file, or a long run of another estimator |
+//! | [`mod@reference`] | what is measured against: a file, or a long run of another estimator |
 //! | [`mean_image`] | a mean of images with the variance of every pixel |
 //! | [`statistics`] | standard errors, intervals, slopes |
 //! | [`bias`] | a test of whether two images have one expectation |
