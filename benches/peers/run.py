@@ -82,10 +82,12 @@ def measured(children, chosen) -> dict:
     fixed = [int(count) for count in chosen.counts.split(",")] if chosen.counts else None
     going = set(children)
     for spp in fixed or (2**power for power in range(13)):
-        for seed in range(chosen.seeds):
+        for _ in range(chosen.seeds):
             for name in sorted(going):
-                image, seconds = children[name].render(spp, 1000 * spp + seed)
-                images[name].append({"spp": spp, "seed": 1000 * spp + seed, "seconds": seconds, "image": image})
+                # One seed an image, far below those of the references, whatever the counts are.
+                number = len(images[name])
+                image, seconds = children[name].render(spp, number)
+                images[name].append({"spp": spp, "seed": number, "seconds": seconds, "image": image})
         # Stop before the rendering that would pass the budget; two counts at least, or there is no line to fit.
         for name in list(going):
             last = min(row["seconds"]["render"] for row in images[name] if row["spp"] == spp)
