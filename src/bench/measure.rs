@@ -12,8 +12,7 @@ use super::reference::{Errors, Reference, ReferenceInfo};
 use super::statistics::{PowerLaw, Summary, fit_power_law};
 use crate::layout::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE};
 use crate::render::{
-    BindingOverride, LightSampling, OpenDevice, PathTracer, ProgressUpdate, Run, Seconds, Settings, StopReason,
-    choose_camera, prepare_scene,
+    LightSampling, OpenDevice, PathTracer, ProgressUpdate, Run, Seconds, Settings, StopReason, path_tracer_on,
 };
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -145,7 +144,7 @@ pub fn measure(
 ) -> Result<Measurement> {
     let mut work = Work::new(settings, plan, progress);
     let reference = find_reference(open, scene, settings, plan, &mut work)?;
-    let (mut tracer, prepare_seconds) = tracer(open, scene, settings)?;
+    let (mut tracer, _, prepare_seconds) = path_tracer_on(open, scene, settings)?;
     let mut mean = ImageAccumulator::new((settings.width, settings.height));
     let mut runs: Vec<Vec<SeedRun>> = plan.spp.iter().map(|_| Vec::new()).collect();
     let mut render_seconds = 0.0;
@@ -218,7 +217,7 @@ fn find_reference(
         ReferenceChoice::Own(spp) => spp.div_ceil(REFERENCE_PARTS),
     };
     let other = other_estimator(settings);
-    let (mut tracer, _) = tracer(open, scene, &other)?;
+    let (mut tracer, ..) = path_tracer_on(open, scene, &other)?;
     let mut image = ImageAccumulator::new((settings.width, settings.height));
     let first_seed = settings.seed.wrapping_add(plan.seeds);
     let mut seconds = 0.0;
@@ -243,18 +242,6 @@ fn find_reference(
 fn shared_seed(path: &Path, seed: u32) -> Error {
     let path = path.display();
     Error::Usage(format!("--reference: {path} has seed {seed}, as one of the images has; choose others by --seed"))
-}
-
-/// The kernel of the scene, and the seconds that preparing the scene took.
-fn tracer(open: &OpenDevice, scene: &Scene, settings: &Settings) -> Result<(PathTracer, f64)> {
-    let camera_index = choose_camera(scene, settings.camera.as_deref())?;
-    let camera =
-        scene.cameras.get(camera_index).ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)))?;
-    let start = Instant::now();
-    let prepared = prepare_scene(scene, camera, settings)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let tracer = PathTracer::new(&open.gpu, open.trace, &prepared, camera, settings, BindingOverride::default())?;
-    Ok((tracer, seconds))
 }
 
 /// The points (x, y) of every seed, one list a seed.

@@ -63,6 +63,25 @@ pub fn render(
     render_on(&open_device(settings)?, scene, settings, progress)
 }
 
+/// The kernel of a scene for the camera that the settings choose, that camera, and the seconds that preparing took.
+///
+/// # Errors
+/// A camera that does not exist, a scene that does not fit, a lost device.
+pub fn path_tracer_on<'a>(
+    open: &OpenDevice,
+    scene: &'a Scene,
+    settings: &Settings,
+) -> Result<(PathTracer, &'a Camera, f64)> {
+    let camera_index = choose_camera(scene, settings.camera.as_deref())?;
+    let camera =
+        scene.cameras.get(camera_index).ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)))?;
+    let start = Instant::now();
+    let prepared = prepare_scene(scene, camera, settings)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let tracer = PathTracer::new(&open.gpu, open.trace, &prepared, camera, settings, BindingOverride::default())?;
+    Ok((tracer, camera, seconds))
+}
+
 /// Renders a scene on an open device.
 ///
 /// # Errors
@@ -73,13 +92,7 @@ pub fn render_on(
     settings: &Settings,
     progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
 ) -> Result<RenderResult> {
-    let camera_index = choose_camera(scene, settings.camera.as_deref())?;
-    let camera =
-        scene.cameras.get(camera_index).ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)))?;
-    let start = Instant::now();
-    let prepared = prepare_scene(scene, camera, settings)?;
-    let prepare_seconds = start.elapsed().as_secs_f64();
-    let mut tracer = PathTracer::new(&open.gpu, open.trace, &prepared, camera, settings, BindingOverride::default())?;
+    let (mut tracer, camera, prepare_seconds) = path_tracer_on(open, scene, settings)?;
     let run = tracer.run_plan(settings.seed, &RunPlan::new(settings), progress)?;
     let mut warnings = Vec::new();
     if run.capped_samples > 0 {

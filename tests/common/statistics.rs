@@ -9,6 +9,8 @@
 use std::f64::consts::{PI, SQRT_2};
 use std::fmt;
 
+pub use sunfleck::bench::statistics::sidak;
+
 /// Rounding of radiance that is summed and stored in 32-bit floats, relative to the value. Keeps two constant tiles (a
 /// lamp that fills the tile) equal although their variance is zero.
 const ROUNDING: f64 = 1e-6;
@@ -140,12 +142,6 @@ pub fn student_two_sided(t: f64, degrees_of_freedom: f64) -> f64 {
 /// P(X ≥ statistic) of the χ² distribution.
 pub fn chi_square_upper_tail(statistic: f64, degrees_of_freedom: f64) -> f64 {
     gamma_upper(0.5 * degrees_of_freedom, 0.5 * statistic)
-}
-
-/// The level of each of `tests` independent tests that gives all of them together the level `alpha`
-/// (Šidák 1967): 1 − (1 − α)^(1/n).
-pub fn sidak(alpha: f64, tests: usize) -> f64 {
-    -((-alpha).ln_1p() / tests as f64).exp_m1()
 }
 
 /// The two-sided p-value of `successes` in `trials` of the given probability: twice the smaller exact tail.
