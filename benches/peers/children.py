@@ -60,7 +60,9 @@ class Child:
                 raise ChildFailed(f"{failure} (no answer in {self.timeout} s)")
         line = self.process.stdout.readline()
         if not line:
-            raise ChildFailed(f"{failure} (it ended with {self.process.wait()})")
+            code = self.process.wait()
+            last = Path(self.log.name).read_text(errors="replace").strip().splitlines()[-1:]
+            raise ChildFailed(": ".join([f"{failure} (it ended with {code})"] + last))
         return json.loads(line)
 
     def render(self, spp, seed):

@@ -12,12 +12,20 @@ from gltf import write_gltf
 from scenes import SCENES
 from worker import serve
 
-BINARY = Path(__file__).resolve().parents[2] / "target" / "release" / "sunfleck"
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def release_binary() -> Path:
+    """Where `cargo build --release` put the binary: the target folder may be moved by the environment or a config file."""
+    command = ["cargo", "metadata", "--format-version", "1", "--no-deps", "--offline"]
+    metadata = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
+    return Path(metadata["target_directory"]) / "release" / "sunfleck"
 
 
 class Sunfleck:
     def __init__(self):
-        self.version = subprocess.run([BINARY, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+        self.binary = release_binary()
+        self.version = subprocess.run([self.binary, "--version"], capture_output=True, text=True, check=True).stdout.strip()
 
     def prepare(self, name, folder, resolution, options):
         self.folder, self.resolution = Path(folder), resolution
@@ -29,7 +37,7 @@ class Sunfleck:
 
     def render(self, spp, seed):
         out = self.folder / f"sunfleck-{self.neutral.name}.exr"
-        command = [BINARY, "render", self.file, "-o", out, "--resolution", f"{self.resolution}x{self.resolution}",
+        command = [self.binary, "render", self.file, "-o", out, "--resolution", f"{self.resolution}x{self.resolution}",
                    "--spp", str(spp), "--seed", str(seed), "--max-bounces", str(self.neutral.max_bounces),
                    "--json", "--quiet", "--strict"]
         if self.neutral.environment is not None:
