@@ -65,10 +65,19 @@ pub fn path_tracer(scene: &Scene, settings: &Settings) -> PathTracer {
 
 /// The same, bound in a chosen way.
 pub fn path_tracer_with(scene: &Scene, settings: &Settings, overrides: BindingOverride) -> PathTracer {
-    let device = device();
+    path_tracer_on(device().trace, scene, settings, overrides)
+}
+
+/// The same, with a chosen back end.
+pub fn path_tracer_on(
+    trace: TraceBackend,
+    scene: &Scene,
+    settings: &Settings,
+    overrides: BindingOverride,
+) -> PathTracer {
     let camera = &scene.cameras[0];
     let prepared = prepare_scene(scene, camera, settings).expect("the scene fits");
-    let tracer = PathTracer::new(&device.gpu, device.trace, &prepared, camera, settings, overrides);
+    let tracer = PathTracer::new(&device().gpu, trace, &prepared, camera, settings, overrides);
     let tracer = tracer.expect("the scene fits the device");
     assert_no_validation_messages();
     tracer

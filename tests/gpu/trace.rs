@@ -1,10 +1,14 @@
 //! The trace interface, in the back end under test, against a loop over all triangles in f64.
 
 use crate::common::brute_force::{check, meet, world_triangles};
+use crate::common::gpu;
 use crate::common::kernel::Random;
+use crate::common::scenes::scene;
 use crate::common::trace::{Hit, NO_TRIANGLE, Ray, icosphere, kernel, placements, scene_of, soup, trace};
 use glam::{DAffine3, DVec3};
+use sunfleck::gpu::TraceBackend;
 use sunfleck::layout::NONE;
+use sunfleck::render::{BindingOverride, Settings};
 use sunfleck::scene::Scene;
 
 fn random_scene() -> Scene {
@@ -85,5 +89,28 @@ fn wrong_hits_are_noticed() {
     ];
     for hit in wrong {
         assert!(std::panic::catch_unwind(|| check(&triangles, ray, &hit)).is_err(), "{hit:?}");
+    }
+}
+
+/// Where rays are traced by ray query: both back ends find the same points, so that the same seed gives the same image. Only
+/// a path whose hit is rounded across an edge or a lobe's choice may go another way.
+#[test]
+fn back_ends_draw_the_same_image() {
+    if gpu::device().trace != TraceBackend::RayQuery {
+        return;
+    }
+    for name in ["instances", "metallic_roughness", "cornell"] {
+        let scene = scene(name);
+        let settings = Settings { max_bounces: Some(3), ..gpu::settings(64, 64) };
+        let draw = |trace| {
+            let mut tracer = gpu::path_tracer_on(trace, &scene, &settings, BindingOverride::default());
+            gpu::run(&mut tracer, 5, 1).film.radiance()
+        };
+        let (bvh, queries) = (draw(TraceBackend::Bvh), draw(TraceBackend::RayQuery));
+        let differs = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-3 * a[c].max(b[c]));
+        let different = bvh.iter().zip(&queries).filter(|(a, b)| differs((a, b))).count();
+        println!("{name}: {different} of {} pixels differ", bvh.len());
+        assert!(different * 100 < bvh.len(), "{name}: {different} of {} pixels differ", bvh.len());
+        assert!(bvh.iter().flatten().any(|c| *c > 0.0), "{name} is black");
     }
 }
