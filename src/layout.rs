@@ -147,7 +147,15 @@ pub const MATERIAL_BLACK_BACK: u32 = 1 << 9;
 /// `kind_flags`: glass with Schlick's Fresnel term.
 pub const MATERIAL_SCHLICK: u32 = 1 << 10;
 
-/// A material's parameters; see `scene::Material`.
+/// `kind_flags`: KHR_materials_volume: transmission refracts into what the surface encloses.
+pub const MATERIAL_VOLUME: u32 = 1 << 11;
+/// `kind_flags`: alpha says whether the surface is there.
+pub const MATERIAL_ALPHA_MASK: u32 = 1 << 12;
+/// `kind_flags`: alpha is the probability that the surface is there.
+pub const MATERIAL_ALPHA_BLEND: u32 = 1 << 13;
+
+/// A material's parameters; see `scene::Material`. Textures are indices of [`TextureHeader`]s or [`NONE`]. A shader reads
+/// the texels of what its scene needs alone.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Material {
@@ -163,20 +171,46 @@ pub struct Material {
     pub metallic: f32,
     /// Index of refraction.
     pub ior: f32,
-    /// Thin-walled transmission.
+    /// Share of the diffuse base that transmits.
     pub transmission: f32,
-    /// Texture index or [`NONE`].
+    /// Factor on the base colour's alpha.
+    pub alpha: f32,
+    /// Base colour and alpha.
     pub base_color_texture: u32,
-    /// Texture index or [`NONE`].
+    /// Roughness in G, metalness in B.
     pub metallic_roughness_texture: u32,
-    /// Texture index or [`NONE`].
+    /// Emission.
     pub emission_texture: u32,
+    /// Tangent-space normals.
+    pub normal_texture: u32,
+    /// Colour of the dielectric's reflectance at normal incidence.
+    pub specular_color: [f32; 3],
+    /// Strength of the dielectric's reflection.
+    pub specular: f32,
+    /// Absorption coefficient of the volume in 1/m.
+    pub absorption: [f32; 3],
+    /// With [`MATERIAL_ALPHA_MASK`]: the surface is there where alpha is at least this.
+    pub alpha_cutoff: f32,
+    /// Strength of the anisotropy.
+    pub anisotropy: f32,
+    /// Angle of the anisotropy from the tangent, in turns.
+    pub anisotropy_turns: f32,
+    /// Scales the x and y of normals from the texture.
+    pub normal_scale: f32,
     /// Unused, zero.
-    pub unused: [u32; 2],
+    pub unused: u32,
+    /// Transmission in R.
+    pub transmission_texture: u32,
+    /// Strength of the specular reflection in A.
+    pub specular_texture: u32,
+    /// Colour of the specular reflection.
+    pub specular_color_texture: u32,
+    /// Anisotropy: direction in R and G, strength in B.
+    pub anisotropy_texture: u32,
 }
 
 /// Texels a material takes.
-pub const MATERIAL_TEXELS: u32 = 4;
+pub const MATERIAL_TEXELS: u32 = 8;
 
 /// `sampling`: texels are sRGB-encoded (alpha never is).
 pub const TEXTURE_SRGB: u32 = 1;

@@ -20,6 +20,13 @@ const bool HAS_IMAGE_ENVIRONMENT = (FEATURES & 16u) != 0u;
 const bool HAS_LENS = (FEATURES & 32u) != 0u;
 const bool HAS_ORTHOGRAPHIC = (FEATURES & 64u) != 0u;
 const bool HAS_BLACK_BACKS = (FEATURES & 128u) != 0u;
+const bool HAS_NORMAL_MAPS = (FEATURES & 256u) != 0u;
+const bool HAS_VERTEX_COLORS = (FEATURES & 512u) != 0u;
+const bool HAS_ALPHA = (FEATURES & 1024u) != 0u;
+const bool HAS_ANISOTROPY = (FEATURES & 2048u) != 0u;
+const bool HAS_SPECULAR = (FEATURES & 4096u) != 0u;
+const bool HAS_TRANSMISSION = (FEATURES & 8192u) != 0u;
+const bool HAS_VOLUME = (FEATURES & 16384u) != 0u;
 
 #define HAS_BSDF(kind) ((BSDFS & (1u << (kind))) != 0u)
 #define HAS_LIGHT(kind) ((LIGHTS & (1u << (kind))) != 0u)

@@ -25,7 +25,10 @@ const uint MATERIAL_KIND_MASK = 0xffu;
 const uint MATERIAL_DOUBLE_SIDED = 0x100u;
 const uint MATERIAL_BLACK_BACK = 0x200u;
 const uint MATERIAL_SCHLICK = 0x400u;
-const uint MATERIAL_TEXELS = 4u;
+const uint MATERIAL_VOLUME = 0x800u;
+const uint MATERIAL_ALPHA_MASK = 0x1000u;
+const uint MATERIAL_ALPHA_BLEND = 0x2000u;
+const uint MATERIAL_TEXELS = 8u;
 
 const uint TEXTURE_SRGB = 1u;
 const uint TEXTURE_16_BIT = 2u;
@@ -118,9 +121,23 @@ struct Material {
     float metallic;
     float ior;
     float transmission;
+    float alpha;
     uint base_color_texture;
     uint metallic_roughness_texture;
     uint emission_texture;
+    uint normal_texture;
+    vec3 specular_color;
+    float specular;
+    vec3 absorption;
+    float alpha_cutoff;
+    float anisotropy;
+    float anisotropy_turns;
+    float normal_scale;
+    uint unused;
+    uint transmission_texture;
+    uint specular_texture;
+    uint specular_color_texture;
+    uint anisotropy_texture;
 };
 
 struct TextureHeader {

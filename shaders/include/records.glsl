@@ -5,12 +5,17 @@
 #include "arrays.glsl"
 #include "math.glsl"
 
+// Texels that no feature of the kernel looks at are not read: the optimiser drops their loads with their uses.
 Material load_material(RenderConstants constants, uint index) {
     uint base = constants.materials + index * MATERIAL_TEXELS;
     uvec4 a = LOAD4(TABLES, base);
     uvec4 b = LOAD4(TABLES, base + 1u);
     uvec4 c = LOAD4(TABLES, base + 2u);
     uvec4 d = LOAD4(TABLES, base + 3u);
+    uvec4 e = LOAD4(TABLES, base + 4u);
+    uvec4 f = LOAD4(TABLES, base + 5u);
+    uvec4 g = LOAD4(TABLES, base + 6u);
+    uvec4 h = LOAD4(TABLES, base + 7u);
     Material m;
     m.base_color = uintBitsToFloat(a.xyz);
     m.kind_flags = a.w;
@@ -19,9 +24,23 @@ Material load_material(RenderConstants constants, uint index) {
     m.metallic = uintBitsToFloat(c.x);
     m.ior = uintBitsToFloat(c.y);
     m.transmission = uintBitsToFloat(c.z);
-    m.base_color_texture = c.w;
-    m.metallic_roughness_texture = d.x;
-    m.emission_texture = d.y;
+    m.alpha = uintBitsToFloat(c.w);
+    m.base_color_texture = d.x;
+    m.metallic_roughness_texture = d.y;
+    m.emission_texture = d.z;
+    m.normal_texture = d.w;
+    m.specular_color = uintBitsToFloat(e.xyz);
+    m.specular = uintBitsToFloat(e.w);
+    m.absorption = uintBitsToFloat(f.xyz);
+    m.alpha_cutoff = uintBitsToFloat(f.w);
+    m.anisotropy = uintBitsToFloat(g.x);
+    m.anisotropy_turns = uintBitsToFloat(g.y);
+    m.normal_scale = uintBitsToFloat(g.z);
+    m.unused = g.w;
+    m.transmission_texture = h.x;
+    m.specular_texture = h.y;
+    m.specular_color_texture = h.z;
+    m.anisotropy_texture = h.w;
     return m;
 }
 

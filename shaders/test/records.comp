@@ -10,39 +10,43 @@ uvec3 bits(vec3 v) { return floatBitsToUint(v); }
 void main() {
     uint lane = gl_GlobalInvocationID.x;
     if (lane >= lanes) return;
-    uint o = 24u * lane;
+    uint o = 28u * lane;
     Material m = load_material(constants, lane);
     outputs[o] = uvec4(bits(m.base_color), m.kind_flags);
     outputs[o + 1u] = uvec4(bits(m.emission), bits(m.roughness));
-    outputs[o + 2u] = uvec4(bits(m.metallic), bits(m.ior), bits(m.transmission), m.base_color_texture);
-    outputs[o + 3u] = uvec4(m.metallic_roughness_texture, m.emission_texture, 0u, 0u);
+    outputs[o + 2u] = uvec4(bits(m.metallic), bits(m.ior), bits(m.transmission), bits(m.alpha));
+    outputs[o + 3u] = uvec4(m.base_color_texture, m.metallic_roughness_texture, m.emission_texture, m.normal_texture);
+    outputs[o + 4u] = uvec4(bits(m.specular_color), bits(m.specular));
+    outputs[o + 5u] = uvec4(bits(m.absorption), bits(m.alpha_cutoff));
+    outputs[o + 6u] = uvec4(bits(m.anisotropy), bits(m.anisotropy_turns), bits(m.normal_scale), m.unused);
+    outputs[o + 7u] = uvec4(m.transmission_texture, m.specular_texture, m.specular_color_texture, m.anisotropy_texture);
     Light light = load_light(constants, lane);
-    outputs[o + 4u] = uvec4(bits(light.position), light.kind);
-    outputs[o + 5u] = uvec4(bits(light.intensity), light.slot);
-    outputs[o + 6u] = uvec4(bits(light.direction), light.instance);
-    outputs[o + 7u] = uvec4(bits(light.cone_scale), bits(light.cone_offset), 0u, 0u);
+    outputs[o + 8u] = uvec4(bits(light.position), light.kind);
+    outputs[o + 9u] = uvec4(bits(light.intensity), light.slot);
+    outputs[o + 10u] = uvec4(bits(light.direction), light.instance);
+    outputs[o + 11u] = uvec4(bits(light.cone_scale), bits(light.cone_offset), 0u, 0u);
     TextureHeader header = load_texture_header(constants, lane);
-    outputs[o + 8u] = uvec4(header.first_word, header.width, header.height, header.sampling);
+    outputs[o + 12u] = uvec4(header.first_word, header.width, header.height, header.sampling);
     Affine forward = load_object_to_world(constants, lane);
     Affine backward = load_world_to_object(constants, lane);
-    outputs[o + 9u] = floatBitsToUint(forward.x);
-    outputs[o + 10u] = floatBitsToUint(forward.y);
-    outputs[o + 11u] = floatBitsToUint(forward.z);
-    outputs[o + 12u] = floatBitsToUint(backward.x);
-    outputs[o + 13u] = floatBitsToUint(backward.y);
-    outputs[o + 14u] = floatBitsToUint(backward.z);
-    outputs[o + 15u] = load_instance_header(constants, lane);
+    outputs[o + 13u] = floatBitsToUint(forward.x);
+    outputs[o + 14u] = floatBitsToUint(forward.y);
+    outputs[o + 15u] = floatBitsToUint(forward.z);
+    outputs[o + 16u] = floatBitsToUint(backward.x);
+    outputs[o + 17u] = floatBitsToUint(backward.y);
+    outputs[o + 18u] = floatBitsToUint(backward.z);
+    outputs[o + 19u] = load_instance_header(constants, lane);
     TriangleVertices t = load_triangle(lane);
-    outputs[o + 16u] = uvec4(bits(t.a), t.triangle);
-    outputs[o + 17u] = uvec4(bits(t.b), t.light);
-    outputs[o + 18u] = uvec4(bits(t.c), t.material);
+    outputs[o + 20u] = uvec4(bits(t.a), t.triangle);
+    outputs[o + 21u] = uvec4(bits(t.b), t.light);
+    outputs[o + 22u] = uvec4(bits(t.c), t.material);
     // At a corner the interpolated attributes are those of one vertex.
     Vertices v = interpolate_vertices(constants, lane, NONE, vec2(0.0, 1.0));
-    outputs[o + 19u] = uvec4(bits(v.normal), bits(v.texcoord.x));
-    outputs[o + 20u] = uvec4(bits(v.texcoord.y), 0u, 0u, 0u);
+    outputs[o + 23u] = uvec4(bits(v.normal), bits(v.texcoord.x));
+    outputs[o + 24u] = uvec4(bits(v.texcoord.y), 0u, 0u, 0u);
     // The generated words, through the word accessor.
-    outputs[o + 21u] = uvec4(LOAD1(TEXELS, 4u * lane), LOAD1(TEXELS, 4u * lane + 1u), LOAD1(TEXELS, 4u * lane + 2u),
+    outputs[o + 25u] = uvec4(LOAD1(TEXELS, 4u * lane), LOAD1(TEXELS, 4u * lane + 1u), LOAD1(TEXELS, 4u * lane + 2u),
                              LOAD1(TEXELS, 4u * lane + 3u));
-    outputs[o + 22u] = LOAD4(TEXELS, lane);
-    outputs[o + 23u] = LOAD4(ENVIRONMENT, lane);
+    outputs[o + 26u] = LOAD4(TEXELS, lane);
+    outputs[o + 27u] = LOAD4(ENVIRONMENT, lane);
 }

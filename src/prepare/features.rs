@@ -24,8 +24,20 @@ pub struct Features {
     pub normals: bool,
     /// Any emissive surface, sampled or not.
     pub emission: bool,
-    /// Any metallic-roughness surface that transmits (thin-walled).
+    /// Any metallic-roughness surface that transmits.
     pub transmission: bool,
+    /// Any surface that encloses a volume.
+    pub volume: bool,
+    /// Any dielectric whose specular reflection is not the plain one of its index of refraction.
+    pub specular: bool,
+    /// Any anisotropic roughness.
+    pub anisotropy: bool,
+    /// Any normal texture.
+    pub normal_maps: bool,
+    /// Any triangle with vertex colours.
+    pub vertex_colors: bool,
+    /// Any surface that rays may pass where its alpha says so.
+    pub alpha: bool,
     /// Any surface with a black back.
     pub black_back: bool,
     /// Any glass with Schlick's Fresnel term.
@@ -49,12 +61,18 @@ impl Features {
             ("schlick", self.schlick),
             ("metallic-roughness", bsdf(BSDF_METALLIC_ROUGHNESS)),
             ("transmission", self.transmission),
+            ("volume", self.volume),
+            ("specular", self.specular),
+            ("anisotropy", self.anisotropy),
             ("unlit", bsdf(BSDF_UNLIT)),
             ("black-back", self.black_back),
             ("emission", self.emission),
             ("textures", self.textures),
             ("emission-textures", self.emission_textures),
             ("normals", self.normals),
+            ("normal-maps", self.normal_maps),
+            ("vertex-colors", self.vertex_colors),
+            ("alpha", self.alpha),
             ("instances", self.instances),
             ("triangle-lights", light(LIGHT_TRIANGLE)),
             ("point-lights", light(LIGHT_POINT)),

@@ -70,10 +70,7 @@ impl MaterialTable {
     pub(super) fn add_features(&self, features: &mut Features) {
         for record in &self.records {
             features.bsdfs |= 1 << (record.kind_flags & crate::layout::MATERIAL_KIND_MASK);
-            features.textures |=
-                [record.base_color_texture, record.metallic_roughness_texture, record.emission_texture]
-                    .iter()
-                    .any(|&texture| texture != NONE);
+            features.textures |= textures_of(record).iter().any(|&texture| texture != NONE);
             features.emission_textures |= record.emission_texture != NONE;
             features.emission |= record.emission != [0.0; 3];
             features.transmission |= record.transmission > 0.0;
@@ -104,6 +101,7 @@ impl MaterialTable {
             _ => None,
         };
         let emissive = may_emit && !map.as_ref().is_some_and(EmissionMap::is_black);
+        let transmission = if rough { material.transmission } else { 0.0 };
         let record = Material {
             base_color: material.base_color,
             kind_flags: kind_flags(material),
@@ -111,19 +109,48 @@ impl MaterialTable {
             roughness: material.roughness,
             metallic: material.metallic,
             ior: material.ior,
-            transmission: if rough { material.transmission } else { 0.0 },
+            transmission,
+            alpha: material.alpha,
             base_color_texture: bind(material.base_color_texture, material.base_color != [0.0; 3], ColorSpace::Srgb)?,
             metallic_roughness_texture: bind(material.metallic_roughness_texture, rough, ColorSpace::Linear)?,
             emission_texture: bind(material.emission_texture, emissive, ColorSpace::Srgb)?,
-            unused: [0; 2],
+            normal_texture: NONE,
+            specular_color: material.specular_color,
+            specular: material.specular,
+            absorption: [0.0; 3],
+            alpha_cutoff: 0.0,
+            anisotropy: material.anisotropy,
+            anisotropy_turns: material.anisotropy_rotation_radians / std::f32::consts::TAU,
+            normal_scale: material.normal_scale,
+            unused: 0,
+            transmission_texture: bind(material.transmission_texture, transmission > 0.0, ColorSpace::Linear)?,
+            specular_texture: bind(material.specular_texture, rough && material.specular > 0.0, ColorSpace::Linear)?,
+            specular_color_texture: bind(material.specular_color_texture, rough, ColorSpace::Srgb)?,
+            anisotropy_texture: bind(
+                material.anisotropy_texture,
+                rough && material.anisotropy > 0.0,
+                ColorSpace::Linear,
+            )?,
         };
-        let textured = [record.base_color_texture, record.metallic_roughness_texture, record.emission_texture]
-            .iter()
-            .any(|&texture| texture != NONE);
+        let textured = textures_of(&record).iter().any(|&texture| texture != NONE);
         self.records.push(record);
         self.emission_maps.push(map.filter(|_| emissive));
         Ok(MaterialUse { record: index, textured, shaded: material.bsdf != Bsdf::Unlit, emissive })
     }
+}
+
+/// Indices of all its textures, or [`NONE`].
+fn textures_of(record: &Material) -> [u32; 8] {
+    [
+        record.base_color_texture,
+        record.metallic_roughness_texture,
+        record.emission_texture,
+        record.normal_texture,
+        record.transmission_texture,
+        record.specular_texture,
+        record.specular_color_texture,
+        record.anisotropy_texture,
+    ]
 }
 
 fn kind_flags(material: &scene::Material) -> u32 {

@@ -74,6 +74,13 @@ impl KernelKey {
             self.lens,
             self.orthographic,
             f.black_back,
+            f.normal_maps,
+            f.vertex_colors,
+            f.alpha,
+            f.anisotropy,
+            f.specular,
+            f.transmission,
+            f.volume,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {

@@ -29,6 +29,30 @@ pub enum Fresnel {
     Schlick,
 }
 
+/// What the alpha of the base colour means.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Nothing: the surface is opaque.
+    #[default]
+    Opaque,
+    /// The surface is there where alpha is at least the cutoff.
+    Mask {
+        /// In [0, 1], or above 1 where nothing is there.
+        cutoff: f32,
+    },
+    /// The share of light that meets the surface; the rest passes straight through.
+    Blend,
+}
+
+/// What fills a closed surface (KHR_materials_volume): it refracts, and absorbs by the Beer-Lambert law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Transmittance over `attenuation_distance`, in [0, 1].
+    pub attenuation_color: [f32; 3],
+    /// In metres, > 0; infinite where nothing is absorbed.
+    pub attenuation_distance: f32,
+}
+
 /// A surface material. Colours are linear Rec.709.
 #[derive(Clone, Debug)]
 pub struct Material {
@@ -50,8 +74,34 @@ pub struct Material {
     pub ior: f32,
     /// Fresnel term of [`Bsdf::Glass`].
     pub fresnel: Fresnel,
-    /// Share of the diffuse base replaced by thin-walled straight-through transmission, in [0, 1].
+    /// Share of the diffuse base replaced by transmission, in [0, 1]: thin-walled, or into the `volume`.
     pub transmission: f32,
+    /// Multiplies `transmission` by its R (linear image).
+    pub transmission_texture: Option<TextureBinding>,
+    /// What the surface encloses; `None` for a thin wall.
+    pub volume: Option<Volume>,
+    /// Strength of the dielectric's specular reflection, in [0, 1] (KHR_materials_specular).
+    pub specular: f32,
+    /// Multiplies `specular` by its A (linear image).
+    pub specular_texture: Option<TextureBinding>,
+    /// Colour of the dielectric's reflectance at normal incidence, ≥ 0; may exceed 1.
+    pub specular_color: [f32; 3],
+    /// Multiplies `specular_color` (sRGB-encoded image, RGB used).
+    pub specular_color_texture: Option<TextureBinding>,
+    /// Strength of the anisotropy, in [0, 1] (KHR_materials_anisotropy).
+    pub anisotropy: f32,
+    /// Direction of the larger roughness' normal: counter-clockwise from the tangent, in radians.
+    pub anisotropy_rotation_radians: f32,
+    /// Direction in its R and G, strength in its B (linear image).
+    pub anisotropy_texture: Option<TextureBinding>,
+    /// Tangent-space normals (linear image, RGB).
+    pub normal_texture: Option<TextureBinding>,
+    /// Scales the x and y of `normal_texture`.
+    pub normal_scale: f32,
+    /// Alpha, in [0, 1]; multiplied by that of `base_color_texture`.
+    pub alpha: f32,
+    /// What alpha means.
+    pub alpha_mode: AlphaMode,
     /// Emitted radiance in W·m⁻²·sr⁻¹ (factor × strength), ≥ 0.
     pub emission: [f32; 3],
     /// Multiplies `emission` (sRGB-encoded image, RGB used).
@@ -76,6 +126,19 @@ impl Default for Material {
             ior: 1.5,
             fresnel: Fresnel::Exact,
             transmission: 0.0,
+            transmission_texture: None,
+            volume: None,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: [1.0; 3],
+            specular_color_texture: None,
+            anisotropy: 0.0,
+            anisotropy_rotation_radians: 0.0,
+            anisotropy_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            alpha: 1.0,
+            alpha_mode: AlphaMode::Opaque,
             emission: [0.0; 3],
             emission_texture: None,
             double_sided: false,
@@ -88,6 +151,22 @@ impl Material {
     /// A Lambertian material of the given albedo.
     pub fn lambertian(name: &str, albedo: [f32; 3]) -> Self {
         Self { name: name.to_owned(), bsdf: Bsdf::Lambertian, base_color: albedo, ..Self::default() }
+    }
+
+    /// The textures that are bound, whatever for.
+    pub fn textures(&self) -> impl Iterator<Item = TextureBinding> {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.emission_texture,
+            self.normal_texture,
+            self.transmission_texture,
+            self.specular_texture,
+            self.specular_color_texture,
+            self.anisotropy_texture,
+        ]
+        .into_iter()
+        .flatten()
     }
 
     /// Whether any point of the surface can emit light that is sampled (unlit surfaces are seen, not sampled).

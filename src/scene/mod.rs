@@ -19,7 +19,7 @@ pub use camera::{Camera, Projection};
 pub use environment::Environment;
 pub use error::{SceneError, SceneResult};
 pub use light::{PunctualKind, PunctualLight};
-pub use material::{Bsdf, Fresnel, Material};
+pub use material::{AlphaMode, Bsdf, Fresnel, Material, Volume};
 pub use mesh::{Instance, Mesh, Primitive};
 pub use texture::{Filter, Image, Texels, Texture, TextureBinding, Wrap};
 

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::{
-    Camera, Environment, Image, Material, Primitive, Projection, PunctualKind, Scene, SceneError, SceneResult, Texels,
+    AlphaMode, Camera, Environment, Image, Material, Primitive, Projection, PunctualKind, Scene, SceneError,
+    SceneResult, Texels,
 };
 
 impl Scene {
@@ -88,16 +89,34 @@ impl Check<'_> {
     }
 
     fn material(&self, place: &str, material: &Material, textures: usize) -> SceneResult<()> {
-        let bindings = [material.base_color_texture, material.metallic_roughness_texture, material.emission_texture];
-        for binding in bindings.into_iter().flatten() {
+        for binding in material.textures() {
             self.index(place, binding.texture, textures)?;
         }
         let unit = |x: f32| (0.0..=1.0).contains(&x);
-        let factors = [material.metallic, material.roughness, material.transmission];
+        let factors = [
+            material.metallic,
+            material.roughness,
+            material.transmission,
+            material.specular,
+            material.anisotropy,
+            material.alpha,
+        ];
         let factors_are_valid = factors.into_iter().chain(material.base_color).all(unit);
         self.that(factors_are_valid, place, "a colour or factor is outside [0, 1]")?;
         let emission_is_valid = material.emission.iter().all(|&e| e >= 0.0 && e.is_finite());
         self.that(emission_is_valid, place, "the emission is negative or not finite")?;
+        let specular_color_is_valid = material.specular_color.iter().all(|&c| c >= 0.0 && c.is_finite());
+        self.that(specular_color_is_valid, place, "the specular colour is negative or not finite")?;
+        let angles_are_finite = material.anisotropy_rotation_radians.is_finite() && material.normal_scale.is_finite();
+        self.that(angles_are_finite, place, "the anisotropy's rotation or the normal scale is not finite")?;
+        let mask_is_valid = match material.alpha_mode {
+            AlphaMode::Mask { cutoff } => cutoff >= 0.0 && cutoff.is_finite(),
+            AlphaMode::Opaque | AlphaMode::Blend => true,
+        };
+        self.that(mask_is_valid, place, "the alpha cutoff is negative or not finite")?;
+        let volume_is_valid =
+            material.volume.is_none_or(|v| v.attenuation_color.into_iter().all(unit) && v.attenuation_distance > 0.0);
+        self.that(volume_is_valid, place, "the volume's attenuation is out of range")?;
         self.that(material.ior > 0.0 && material.ior.is_finite(), place, "the index of refraction is not positive")
     }
 

@@ -28,10 +28,7 @@ impl Loader<'_> {
 
     /// Whether a material of the scene reads any texture.
     pub(super) fn is_textured(&self, material: usize) -> bool {
-        let material = &self.scene.materials[material];
-        material.base_color_texture.is_some()
-            || material.metallic_roughness_texture.is_some()
-            || material.emission_texture.is_some()
+        self.scene.materials[material].textures().next().is_some()
     }
 
     fn read_material(&mut self, place: &Json<'_>, has_texcoords: bool) -> SceneResult<Material> {
