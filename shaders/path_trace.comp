@@ -83,12 +83,17 @@ bool sample_direct_light(inout LaneState lane, Surface surface, vec3 wo, Triangl
     uvec4 bits = sample_bits(key, lane.bounce, DIMENSIONS_LIGHT);
     uvec4 environment_bits = uvec4(0u);
     if (HAS_LIGHT(LIGHT_ENVIRONMENT)) environment_bits = sample_bits(key, lane.bounce, DIMENSIONS_ENVIRONMENT);
-    // Every continuous lobe reflects, so the shadow ray leaves on the side of wo.
+    // The side of wo alone, where every continuous lobe reflects; else the side is known once the light is.
     vec3 origin = offset_origin(surface.point, surface.side_normal);
     LightSample light = sample_light(constants, origin, bits.xyz, environment_bits);
     vec3 wi = to_local(surface.frame, light.direction);
-    if (max_component(light.radiance) <= 0.0 || wi.y <= 0.0 || dot(light.direction, surface.side_normal) <= 0.0)
+    if (max_component(light.radiance) <= 0.0) return false;
+    bool through = bsdf_transmits(surface.bsdf) && wi.y < 0.0;
+    // Through the shading frame but not through the surface, or the other way round: no light.
+    if (through ? dot(light.direction, surface.side_normal) >= 0.0
+                : wi.y <= 0.0 || dot(light.direction, surface.side_normal) <= 0.0)
         return false;
+    if (through) origin = offset_origin(surface.point, light.direction);
     float weight = 1.0;
     if (light.pdf > 0.0) {
         if (LIGHT_SAMPLING == LIGHT_SAMPLING_BSDF) return false;
@@ -98,7 +103,7 @@ bool sample_direct_light(inout LaneState lane, Surface surface, vec3 wo, Triangl
         if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE) weight = mixture_weight(light.pdf, bsdf_density);
         if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIS) weight = mis_weight(light.pdf, bsdf_density);
     }
-    lane.shadow_light = lane.throughput * bsdf_evaluate(surface.bsdf, wo, wi) * (wi.y * weight) * light.radiance;
+    lane.shadow_light = lane.throughput * bsdf_evaluate(surface.bsdf, wo, wi) * (abs(wi.y) * weight) * light.radiance;
     if (max_component(lane.shadow_light) <= 0.0) return false;
     lane.ray = Ray(origin, light.direction, light.distance, true, triangle, light.triangle);
     return true;

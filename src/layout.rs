@@ -209,6 +209,9 @@ pub struct Material {
     pub anisotropy_texture: u32,
 }
 
+/// Nodes of the albedo table of GGX along each of its coordinates. A texel holds a node and the one after it.
+pub const GGX_ALBEDO_SIZE: u32 = 48;
+
 /// Texels a material takes.
 pub const MATERIAL_TEXELS: u32 = 8;
 
@@ -362,8 +365,8 @@ pub struct RenderConstants {
     pub environment_marginal_word: u32,
     /// First word of its conditional CDFs; row r starts at `+ r · (width + 1)`.
     pub environment_conditional_word: u32,
-    /// Unused, zero.
-    pub unused_too: u32,
+    /// First texel of the albedo table of GGX in [`SceneArray::Tables`], if a BSDF needs it.
+    pub ggx_albedo: u32,
     /// Constant radiance, or the factor on the image.
     pub environment_radiance: [f32; 3],
     /// Cosine of the environment's rotation about +Y.

@@ -2,6 +2,7 @@
 // and point away from the surface. Continuous and discrete probability are never mixed: bsdf_evaluate and bsdf_pdf know
 // the continuous lobes alone, and a sample says by its flags which kind it is.
 //
+//   bsdf_prepare:  completes the parameters for a wo; the others must be called with that wo.
 //   bsdf_scatter:  draws wi; weight = f·|cos θi| / pdf for a continuous lobe, f·|cos θi| / probability for a delta lobe;
 //                  the probability of choosing the lobe is in both. A zero weight means absorption.
 //   bsdf_evaluate: f(wo, wi), without the cosine, in 1/sr.
@@ -13,6 +14,7 @@
 #include "features.glsl"
 #include "layout.glsl"
 #include "math.glsl"
+#include "ggx.glsl"
 
 const uint SCATTERED_DELTA = 1u;
 const uint SCATTERED_THROUGH = 2u;
@@ -21,11 +23,14 @@ struct BsdfParameters {
     uint kind;
     vec3 color;
     float metallic;
-    float alpha;  // GGX; 0 where the specular lobe is a delta
+    vec2 alpha;   // GGX along x and z; 0 where the specular lobe is a delta
     float ior;    // of the inside relative to the outside
     float eta;    // index of refraction of the far side relative to wo's side
     float transmission;
+    float specular;
+    vec3 specular_color;
     bool schlick;
+    GgxAlbedo albedo;  // set by bsdf_prepare
 };
 
 struct BsdfSample {
@@ -40,6 +45,12 @@ const BsdfSample ABSORBED = BsdfSample(vec3(0.0, 1.0, 0.0), vec3(0.0), 0.0, 0u);
 #include "bsdf_lambertian.glsl"
 #include "bsdf_specular.glsl"
 #include "bsdf_metallic_roughness.glsl"
+
+void bsdf_prepare(RenderConstants constants, inout BsdfParameters p, vec3 wo) {
+    p.albedo = GgxAlbedo(1.0, 0.0);
+    if (HAS_BSDF(BSDF_METALLIC_ROUGHNESS) && p.kind == BSDF_METALLIC_ROUGHNESS)
+        metallic_roughness_prepare(constants, p, wo);
+}
 
 // `u`: lobe, direction u, direction v.
 BsdfSample bsdf_scatter(BsdfParameters p, vec3 wo, vec3 u) {
@@ -64,6 +75,11 @@ float bsdf_pdf(BsdfParameters p, vec3 wo, vec3 wi) {
     if (HAS_BSDF(BSDF_METALLIC_ROUGHNESS) && p.kind == BSDF_METALLIC_ROUGHNESS)
         return metallic_roughness_pdf(p, wo, wi);
     return 0.0;
+}
+
+// Whether light that comes from the other side can be scattered by a continuous lobe.
+bool bsdf_transmits(BsdfParameters p) {
+    return HAS_TRANSMISSION && p.kind == BSDF_METALLIC_ROUGHNESS && p.transmission > 0.0 && !ggx_is_delta(p);
 }
 
 // Whether light sampling can reach anything: is there a continuous lobe?

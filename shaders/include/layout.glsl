@@ -30,6 +30,8 @@ const uint MATERIAL_ALPHA_MASK = 0x1000u;
 const uint MATERIAL_ALPHA_BLEND = 0x2000u;
 const uint MATERIAL_TEXELS = 8u;
 
+const uint GGX_ALBEDO_SIZE = 48u;
+
 const uint TEXTURE_SRGB = 1u;
 const uint TEXTURE_16_BIT = 2u;
 const uint TEXTURE_NEAREST = 4u;
@@ -79,7 +81,7 @@ struct RenderConstants {
     uint environment_height;
     uint environment_marginal_word;
     uint environment_conditional_word;
-    uint unused_too;
+    uint ggx_albedo;
     vec3 environment_radiance;
     float environment_cos;
     vec3 scene_center;

@@ -38,11 +38,20 @@ BsdfParameters bsdf_parameters(RenderConstants constants, Material material, vec
         roughness *= texel.g;
         p.metallic *= texel.b;
     }
-    p.alpha = roughness * roughness;
-    p.alpha = p.alpha < SMALLEST_ALPHA ? 0.0 : p.alpha;
+    float alpha = roughness * roughness;
+    p.alpha = vec2(alpha < SMALLEST_ALPHA ? 0.0 : alpha);
     p.ior = material.ior;
-    p.eta = front ? material.ior : 1.0 / material.ior;
+    // A thin wall has the same medium on both sides.
+    p.eta = p.kind == BSDF_METALLIC_ROUGHNESS ? 1.0 : (front ? material.ior : 1.0 / material.ior);
     p.transmission = material.transmission;
+    p.specular = material.specular;
+    p.specular_color = material.specular_color;
+    if (HAS_SPECULAR && HAS_TEXTURES && material.specular_texture != NONE)
+        p.specular *= sample_texture(constants, material.specular_texture, uv).a;
+    if (HAS_SPECULAR && HAS_TEXTURES && material.specular_color_texture != NONE)
+        p.specular_color *= sample_texture(constants, material.specular_color_texture, uv).rgb;
+    if (HAS_TRANSMISSION && HAS_TEXTURES && material.transmission_texture != NONE)
+        p.transmission *= sample_texture(constants, material.transmission_texture, uv).r;
     p.schlick = (material.kind_flags & MATERIAL_SCHLICK) != 0u;
     return p;
 }
@@ -59,6 +68,7 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo) {
     Material material = load_material(constants, vertices.material);
     s.bsdf = bsdf_parameters(constants, material, attributes.texcoord, front);
     s.frame = frame_from_normal(interpolated_normal(attributes, s.side_normal, wo, kind_has_delta_lobes(s.bsdf.kind)));
+    bsdf_prepare(constants, s.bsdf, to_local(s.frame, wo));
     s.emission = emits_to_side(material, front) ? material_emission(constants, material, attributes.texcoord) : vec3(0.0);
     s.light = vertices.light;
     if (HAS_INSTANCES && s.light != NONE && hit.triangle.instance != NONE)

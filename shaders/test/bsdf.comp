@@ -22,10 +22,12 @@ BsdfParameters load(uint configuration, out vec3 wo) {
     p.kind = inputs[base].w & MATERIAL_KIND_MASK;
     p.schlick = (inputs[base].w & MATERIAL_SCHLICK) != 0u;
     p.metallic = b.x;
-    p.alpha = b.y;
+    p.alpha = vec2(b.y, c.y);
     p.ior = b.z;
     p.eta = b.w;
     p.transmission = c.x;
+    p.specular = c.z;
+    p.specular_color = vec3(c.w);
     wo = uintBitsToFloat(inputs[base + 3u].xyz);
     return p;
 }
@@ -38,11 +40,14 @@ void main() {
     uvec4 node = inputs[1u + 4u * inputs[0].x + lane];
     vec3 wi = uintBitsToFloat(node.xyz);
     BsdfParameters p = load(node.w, wo);
+    bsdf_prepare(constants, p, wo);
     outputs[2u * lane] = floatBitsToUint(vec4(bsdf_evaluate(p, wo, wi), bsdf_pdf(p, wo, wi) * PDF_FAULT));
+    bsdf_prepare(constants, p, wi);
     outputs[2u * lane + 1u] = floatBitsToUint(vec4(bsdf_evaluate(p, wi, wo), bsdf_pdf(p, wi, wo) * PDF_FAULT));
 #else
     BsdfParameters p = load(lane / inputs[0].y, wo);
     p.alpha *= ALPHA_FAULT;
+    bsdf_prepare(constants, p, wo);
     vec4 u = to_unit(sample_bits(SampleKey(lane, lane % inputs[0].y, inputs[0].z), 0u, DIMENSIONS_SCATTER));
     BsdfSample s = bsdf_scatter(p, wo, u.xyz);
     outputs[2u * lane] = uvec4(floatBitsToUint(s.wi), s.flags);

@@ -6,7 +6,7 @@ use super::features::Features;
 use super::textures::{ColorSpace, TextureTable};
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_BLACK_BACK,
-    MATERIAL_DOUBLE_SIDED, MATERIAL_SCHLICK, Material, NONE, SLOT_MATERIAL_MASK,
+    MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK, Material, NONE, SLOT_MATERIAL_MASK,
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding};
 
@@ -66,14 +66,20 @@ impl MaterialTable {
         self.emission_maps[record as usize].as_ref()
     }
 
+    /// Whether any surface has the lobes of GGX.
+    pub(super) fn need_ggx(&self) -> bool {
+        self.records.iter().any(|record| record.kind_flags & MATERIAL_KIND_MASK == BSDF_METALLIC_ROUGHNESS)
+    }
+
     /// Adds what the materials need.
     pub(super) fn add_features(&self, features: &mut Features) {
         for record in &self.records {
-            features.bsdfs |= 1 << (record.kind_flags & crate::layout::MATERIAL_KIND_MASK);
+            features.bsdfs |= 1 << (record.kind_flags & MATERIAL_KIND_MASK);
             features.textures |= textures_of(record).iter().any(|&texture| texture != NONE);
             features.emission_textures |= record.emission_texture != NONE;
             features.emission |= record.emission != [0.0; 3];
             features.transmission |= record.transmission > 0.0;
+            features.specular |= has_specular(record);
             features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
             features.schlick |= record.kind_flags & MATERIAL_SCHLICK != 0;
         }
@@ -137,6 +143,14 @@ impl MaterialTable {
         self.emission_maps.push(map.filter(|_| emissive));
         Ok(MaterialUse { record: index, textured, shaded: material.bsdf != Bsdf::Unlit, emissive })
     }
+}
+
+/// Whether the reflection of a dielectric is not the plain one of its index of refraction.
+fn has_specular(record: &Material) -> bool {
+    let textured = record.specular_texture != NONE || record.specular_color_texture != NONE;
+    record.kind_flags & MATERIAL_KIND_MASK == BSDF_METALLIC_ROUGHNESS
+        && record.metallic < 1.0
+        && (textured || record.specular != 1.0 || record.specular_color != [1.0; 3])
 }
 
 /// Indices of all its textures, or [`NONE`].

@@ -12,6 +12,7 @@ mod emission;
 pub mod environment;
 mod features;
 mod geometry;
+mod ggx;
 mod instances;
 mod lights;
 mod materials;

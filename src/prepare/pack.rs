@@ -65,6 +65,7 @@ pub(super) fn pack_arrays(
         environment_height: environment.height,
         environment_marginal_word: environment.marginal_word,
         environment_conditional_word: environment.conditional_word,
+        ggx_albedo: if materials.need_ggx() { append(&mut tables, &super::ggx::albedo_table()) } else { 0 },
         environment_radiance: environment.radiance,
         environment_cos: cos as f32,
         environment_sin: sin as f32,

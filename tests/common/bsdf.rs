@@ -5,7 +5,9 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use glam::DVec3;
 use sunfleck::layout::{BSDF_METALLIC_ROUGHNESS, MATERIAL_SCHLICK};
 
+use super::ggx_albedo::{self, Albedo};
 use super::kernel::{TestKernel, floats, texel, vector, vector_texel};
+use super::scenes::scene;
 
 /// Flags of a sample, as in shaders/include/bsdf.glsl.
 pub const SCATTERED_DELTA: u32 = 1;
@@ -18,16 +20,34 @@ pub struct Configuration {
     pub schlick: bool,
     pub color: [f32; 3],
     pub metallic: f32,
+    /// Geometric mean of the roughness along x and z.
     pub alpha: f32,
+    /// √(αx/αz).
+    pub stretch: f32,
     pub ior: f32,
     pub eta: f32,
     pub transmission: f32,
+    pub specular: f32,
+    pub specular_color: f32,
     pub wo: DVec3,
 }
 
 impl Configuration {
     pub fn new(kind: u32, color: [f32; 3], wo: DVec3) -> Self {
-        Self { kind, schlick: false, color, metallic: 0.0, alpha: 0.0, ior: 1.5, eta: 1.5, transmission: 0.0, wo }
+        Self {
+            kind,
+            schlick: false,
+            color,
+            metallic: 0.0,
+            alpha: 0.0,
+            stretch: 1.0,
+            ior: 1.5,
+            eta: 1.5,
+            transmission: 0.0,
+            specular: 1.0,
+            specular_color: 1.0,
+            wo,
+        }
     }
 
     pub fn metallic_roughness(roughness: f32, metallic: f32, ior: f32, transmission: f32, wo: DVec3) -> Self {
@@ -36,12 +56,18 @@ impl Configuration {
         Self { metallic, alpha, ior, eta: ior, transmission, ..Self::new(BSDF_METALLIC_ROUGHNESS, color, wo) }
     }
 
+    /// Roughness along x and z.
+    pub fn alphas(&self) -> [f32; 2] {
+        [self.alpha * self.stretch, self.alpha / self.stretch]
+    }
+
     fn texels(&self) -> [[u32; 4]; 4] {
         let [r, g, b] = self.color.map(f32::to_bits);
+        let [alpha_x, alpha_z] = self.alphas();
         [
             [r, g, b, self.kind | if self.schlick { MATERIAL_SCHLICK } else { 0 }],
-            texel(self.metallic, self.alpha, self.ior, self.eta),
-            texel(self.transmission, 0.0, 0.0, 0.0),
+            texel(self.metallic, alpha_x, self.ior, self.eta),
+            texel(self.transmission, alpha_z, self.specular, self.specular_color),
             vector_texel(self.wo, 0),
         ]
     }
@@ -49,8 +75,8 @@ impl Configuration {
     /// How much the rounding of directions to f32 can change D(h), relatively: the half vector's slope is known to
     /// 2^-24 / cos θh·(cos θo + cos θi)/2, and d ln D / d slope is at most 2/α.
     pub fn rounding(&self, wi: DVec3) -> f64 {
-        let alpha = f64::from(self.alpha);
-        if alpha == 0.0 { 0.0 } else { 2.0 / alpha * 2.0_f64.powi(-23) / (self.wo.y + wi.y).max(1e-30) }
+        let alpha = self.alphas().map(f64::from).into_iter().fold(f64::INFINITY, f64::min);
+        if alpha == 0.0 { 0.0 } else { 2.0 / alpha * 2.0_f64.powi(-23) / (self.wo.y + wi.y.abs()).max(1e-30) }
     }
 }
 
@@ -108,87 +134,140 @@ pub fn scatter(kernel: &TestKernel, configurations: &[Configuration], samples: u
 
 /// The shader's values at pairs of (index of the configuration, wi). `kernel` defines EVALUATE.
 pub fn evaluate(kernel: &TestKernel, configurations: &[Configuration], at: &[(usize, DVec3)]) -> Vec<Value> {
-    let mut inputs = inputs(configurations, 1, 0);
-    inputs.extend(at.iter().map(|(index, wi)| vector_texel(*wi, *index as u32)));
-    let outputs = kernel.run(&inputs, at.len(), 2);
     let value = |t: &[[u32; 4]]| Value { f: vector(t[0]), pdf: floats(t[0])[3].into(), reverse_f: vector(t[1]) };
-    outputs.chunks_exact(2).map(value).collect()
+    let batch = |at: &[(usize, DVec3)]| {
+        let mut inputs = inputs(configurations, 1, 0);
+        inputs.extend(at.iter().map(|(index, wi)| vector_texel(*wi, *index as u32)));
+        kernel.run(&inputs, at.len(), 2).chunks_exact(2).map(value).collect::<Vec<_>>()
+    };
+    // Few enough for every device's largest buffer and dispatch.
+    at.chunks(1 << 20).flat_map(batch).collect()
 }
 
 pub fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// glTF's metallic-roughness model in f64 (specification 2.0, appendix B.3).
+/// shaders/test/bsdf.comp with a scene that has the albedo table.
+pub fn bsdf_kernel() -> TestKernel {
+    TestKernel::with_scene("bsdf.comp", &scene("metallic_roughness"))
+}
+
+/// The metallic-roughness model of shaders/include/bsdf_metallic_roughness.glsl in f64, with the albedo of its table.
 pub struct MetallicRoughness {
-    alpha: f64,
+    alpha: [f64; 2],
     transmission: f64,
-    f0: DVec3,
-    diffuse: DVec3,
+    color: DVec3,
+    metallic: f64,
+    /// The dielectric's reflectance along the normal and at grazing incidence.
+    dielectric: [f64; 2],
+    base: DVec3,
+    albedo: Albedo,
 }
 
 impl MetallicRoughness {
-    pub fn new(c: &Configuration) -> Self {
+    /// As seen from `wo`.
+    pub fn new(c: &Configuration, wo: DVec3) -> Self {
         let color = DVec3::from(c.color.map(f64::from));
-        let (ior, metallic) = (f64::from(c.ior), f64::from(c.metallic));
-        let f0 = DVec3::splat(((ior - 1.0) / (ior + 1.0)).powi(2)).lerp(color, metallic);
-        Self { alpha: c.alpha.into(), transmission: c.transmission.into(), f0, diffuse: color * (1.0 - metallic) }
+        let [ior, metallic, specular] = [c.ior, c.metallic, c.specular].map(f64::from);
+        let dielectric = (((ior - 1.0) / (ior + 1.0)).powi(2) * f64::from(c.specular_color)).min(1.0) * specular;
+        let alpha = c.alphas().map(f64::from);
+        Self {
+            alpha,
+            transmission: c.transmission.into(),
+            color,
+            metallic,
+            dielectric: [dielectric, specular],
+            base: color * (1.0 - metallic),
+            albedo: if c.alpha == 0.0 {
+                Albedo { white: 1.0, schlick: (1.0 - wo.y).powi(5) }
+            } else {
+                ggx_albedo::stored(wo, alpha)
+            },
+        }
     }
 
-    pub fn fresnel(&self, cosine: f64) -> DVec3 {
-        self.f0 + (DVec3::ONE - self.f0) * (1.0 - cosine).powi(5)
+    /// What is given back of the light that one scattering of reflectance `f0` loses.
+    pub fn multiple_scattering(&self, f0: DVec3) -> DVec3 {
+        DVec3::ONE + f0 * ((1.0 - self.albedo.white) / self.albedo.white)
     }
 
-    /// Weight of the thin-walled transmission before its probability is divided out.
-    pub fn through(&self, cosine: f64) -> DVec3 {
-        (DVec3::ONE - self.fresnel(cosine)) * self.transmission * self.diffuse
+    /// Fresnel terms along the normal and at grazing incidence, times their factors.
+    fn specular_term(&self) -> [DVec3; 2] {
+        let [f0, f90] = self.dielectric.map(DVec3::splat);
+        let of_dielectric = self.multiple_scattering(f0) * (1.0 - self.metallic);
+        let of_metal = self.multiple_scattering(self.color) * self.metallic;
+        [f0 * of_dielectric + self.color * of_metal, f90 * of_dielectric + of_metal]
+    }
+
+    /// Albedo of the specular lobe.
+    pub fn specular_albedo(&self) -> DVec3 {
+        let Albedo { white, schlick } = self.albedo;
+        let [f0, f90] = self.specular_term();
+        f0 * (white - schlick) + f90 * schlick
+    }
+
+    /// Albedo of the diffuse and the transmitting lobe together.
+    pub fn base_albedo(&self) -> DVec3 {
+        let Albedo { white, schlick } = self.albedo;
+        let [f0, f90] = self.dielectric;
+        let kept = (f0 * (white - schlick) + f90 * schlick) * (1.0 + f0 * (1.0 - white) / white);
+        self.base * (1.0 - kept)
+    }
+
+    /// Weight of the smooth transmission before its probability is divided out.
+    pub fn through(&self) -> DVec3 {
+        self.base_albedo() * self.transmission
     }
 
     /// Probabilities of the specular, the diffuse and the transmitting lobe.
-    pub fn lobes(&self, cosine: f64) -> DVec3 {
-        let mean = self.f0 + (DVec3::ONE - self.f0) / 21.0;
-        let base = luminance(self.diffuse);
-        let weights = DVec3::new(
-            luminance(self.fresnel(cosine).max(mean)),
-            base * (1.0 - self.transmission) * (1.0 - luminance(mean)),
-            base * self.transmission * (1.0 - luminance(self.fresnel(cosine))),
-        );
+    pub fn lobes(&self) -> DVec3 {
+        let base = luminance(self.base_albedo());
+        let weights =
+            DVec3::new(luminance(self.specular_albedo()), base * (1.0 - self.transmission), base * self.transmission);
         weights / weights.element_sum()
     }
 
     fn distribution(&self, h: DVec3) -> f64 {
-        let a2 = self.alpha * self.alpha;
-        a2 / (PI * (h.x * h.x + h.z * h.z + a2 * h.y * h.y).powi(2))
+        let [x, z] = self.alpha;
+        1.0 / (PI * x * z * ((h.x / x).powi(2) + (h.z / z).powi(2) + h.y * h.y).powi(2))
     }
 
     /// Smith's Λ.
-    fn lambda(&self, cosine: f64) -> f64 {
-        let tan2 = (1.0 - cosine * cosine) / (cosine * cosine);
-        0.5 * ((1.0 + self.alpha * self.alpha * tan2).sqrt() - 1.0)
+    fn lambda(&self, w: DVec3) -> f64 {
+        let [x, z] = self.alpha;
+        0.5 * ((1.0 + ((x * w.x).powi(2) + (z * w.z).powi(2)) / (w.y * w.y)).sqrt() - 1.0)
+    }
+
+    /// Density of reflections by bounded visible normals (Eto and Tokuyoshi 2023, eq. 8).
+    fn reflection_pdf(&self, wo: DVec3, h: DVec3) -> f64 {
+        let smallest = self.alpha[0].min(self.alpha[1]).min(1.0);
+        let s = 1.0 + wo.x.hypot(wo.z);
+        let bound = (1.0 - smallest * smallest) * s * s / (s * s + smallest * smallest * wo.y * wo.y);
+        self.distribution(h) / (2.0 * wo.y * (bound + 1.0 + 2.0 * self.lambda(wo)))
     }
 
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
-        if wi.y <= 0.0 {
-            return 0.0;
-        }
-        let lobes = self.lobes(wo.y);
-        let mut pdf = lobes.y * wi.y / PI;
-        if self.alpha > 0.0 {
-            let h = (wo + wi).normalize();
-            pdf += lobes.x * self.distribution(h) / (1.0 + self.lambda(wo.y)) / (4.0 * wo.y);
-        }
-        pdf
+        let lobes = self.lobes();
+        let up = DVec3::new(wi.x, wi.y.abs(), wi.z);
+        let microfacets = if self.alpha[0] > 0.0 { self.reflection_pdf(wo, (wo + up).normalize()) } else { 0.0 };
+        if wi.y < 0.0 { lobes.z * microfacets } else { lobes.y * wi.y / PI + lobes.x * microfacets }
     }
 
     pub fn evaluate(&self, wo: DVec3, wi: DVec3) -> DVec3 {
-        let h = (wo + wi).normalize();
-        let fresnel = self.fresnel(wo.dot(h));
-        let mut f = (DVec3::ONE - fresnel) * self.diffuse * ((1.0 - self.transmission) / PI);
-        if self.alpha > 0.0 {
-            let masking = 1.0 / (1.0 + self.lambda(wo.y) + self.lambda(wi.y));
-            f += fresnel * self.distribution(h) * masking / (4.0 * wo.y * wi.y);
+        let up = DVec3::new(wi.x, wi.y.abs(), wi.z);
+        let h = (wo + up).normalize();
+        let microfacets = if self.alpha[0] > 0.0 {
+            self.distribution(h) / (4.0 * wo.y * up.y * (1.0 + self.lambda(wo) + self.lambda(up)))
+        } else {
+            0.0
+        };
+        if wi.y < 0.0 {
+            return self.base_albedo() * (self.transmission * microfacets / self.albedo.white);
         }
-        f
+        let [f0, f90] = self.specular_term();
+        let fresnel = f0 + (f90 - f0) * (1.0 - wo.dot(h)).powi(5);
+        self.base_albedo() * ((1.0 - self.transmission) / PI) + fresnel * microfacets
     }
 }
 

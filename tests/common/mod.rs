@@ -5,6 +5,7 @@ pub mod assets;
 pub mod brute_force;
 pub mod bsdf;
 pub mod builder;
+pub mod ggx_albedo;
 pub mod gpu;
 pub mod kernel;
 pub mod mutation;

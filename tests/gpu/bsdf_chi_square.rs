@@ -2,8 +2,8 @@
 //! parameters, with bins narrow enough for the narrowest lobe. Delta lobes and absorption are cells of their own.
 
 use crate::common::bsdf::{
-    Configuration, HalfVectorBins, MetallicRoughness, Node, SCATTERED_THROUGH, Sample, Value, direction, evaluate,
-    luminance, scatter,
+    Configuration, HalfVectorBins, MetallicRoughness, Node, SCATTERED_THROUGH, Sample, Value, bsdf_kernel, direction,
+    evaluate, luminance, scatter,
 };
 use crate::common::kernel::TestKernel;
 use crate::common::statistics::{ChiSquare, chi_square_test, sidak};
@@ -40,6 +40,20 @@ fn configurations() -> Vec<Configuration> {
             }
         }
     }
+    // Anisotropic, and with a specular reflection of its own strength and colour.
+    for (i, stretch) in [0.6, 1.0, 1.7].into_iter().enumerate() {
+        for (j, cosine) in COSINES.into_iter().take(4).enumerate() {
+            let roughness = [0.3, 0.5, 0.8][(i + j) % 3];
+            let wo = direction(cosine, 0.3 + (i + 3 * j) as f64);
+            let plain = Configuration::metallic_roughness(roughness, [0.0, 1.0][j % 2], 1.5, 0.3, wo);
+            all.push(Configuration {
+                stretch,
+                specular: [0.4, 1.0, 0.0][i],
+                specular_color: [2.0, 0.3, 1.0][i],
+                ..plain
+            });
+        }
+    }
     let lambertian = |cosine| Configuration::new(BSDF_LAMBERTIAN, [0.8, 0.5, 0.2], direction(cosine, 4.0));
     all.extend([1.0, 0.4, 1e-6].map(lambertian));
     all
@@ -50,15 +64,35 @@ fn bins(c: &Configuration) -> HalfVectorBins {
     HalfVectorBins::new(alpha, c.wo)
 }
 
+/// Bins above the surface, then as many below it.
+fn cells(c: &Configuration) -> usize {
+    2 * bins(c).len()
+}
+
+/// Those of the bins, and where the surface transmits, their mirror images.
+fn nodes(c: &Configuration, order: usize) -> Vec<Node> {
+    let bins = bins(c);
+    let mut nodes = bins.nodes(order);
+    if c.transmission > 0.0 {
+        let mirrored = |n: &Node| Node { bin: n.bin + bins.len(), wi: mirrored(n.wi), weight: n.weight };
+        nodes.extend(nodes.iter().map(mirrored).collect::<Vec<_>>());
+    }
+    nodes
+}
+
+fn mirrored(w: DVec3) -> DVec3 {
+    DVec3::new(w.x, -w.y, w.z)
+}
+
 /// The integral over each bin of what the shader says at its nodes.
 struct Integrals {
     pdf: Vec<f64>,
-    /// ∫ f cos over all bins.
+    /// ∫ f·|cos| over all bins.
     albedo: DVec3,
 }
 
 fn integrate(kernel: &TestKernel, configurations: &[Configuration]) -> Vec<Integrals> {
-    let nodes: Vec<Vec<Node>> = configurations.iter().map(|c| bins(c).nodes(ORDER)).collect();
+    let nodes: Vec<Vec<Node>> = configurations.iter().map(|c| nodes(c, ORDER)).collect();
     let at: Vec<(usize, DVec3)> =
         nodes.iter().enumerate().flat_map(|(i, nodes)| nodes.iter().map(move |node| (i, node.wi))).collect();
     let values = evaluate(kernel, configurations, &at);
@@ -66,7 +100,7 @@ fn integrate(kernel: &TestKernel, configurations: &[Configuration]) -> Vec<Integ
     let integrals = |(c, nodes): (&Configuration, &Vec<Node>)| {
         let (own, others) = rest.split_at(nodes.len());
         rest = others;
-        let mut result = Integrals { pdf: vec![0.0; bins(c).len()], albedo: DVec3::ZERO };
+        let mut result = Integrals { pdf: vec![0.0; cells(c)], albedo: DVec3::ZERO };
         for (node, value) in nodes.iter().zip(own) {
             assert!(
                 value.pdf.is_finite() && value.pdf >= 0.0 && value.f.is_finite(),
@@ -74,7 +108,7 @@ fn integrate(kernel: &TestKernel, configurations: &[Configuration]) -> Vec<Integ
                 node.wi
             );
             result.pdf[node.bin] += value.pdf * node.weight;
-            result.albedo += value.f * (node.wi.y.max(0.0) * node.weight);
+            result.albedo += value.f * (node.wi.y.abs() * node.weight);
         }
         result
     };
@@ -86,20 +120,22 @@ fn delta_probabilities(c: &Configuration) -> [f64; 2] {
     if c.kind != BSDF_METALLIC_ROUGHNESS {
         return [0.0; 2];
     }
-    let lobes = MetallicRoughness::new(c).lobes(c.wo.y);
-    [if c.alpha == 0.0 { lobes.x } else { 0.0 }, lobes.z]
+    let lobes = MetallicRoughness::new(c, c.wo).lobes();
+    if c.alpha == 0.0 { [lobes.x, lobes.z] } else { [0.0; 2] }
 }
 
-/// Cells: the bins, then the two delta lobes; what is absorbed is in none.
+/// Cells: the bins above and below, then the two delta lobes; what is absorbed is in none.
 fn count(c: &Configuration, samples: &[Sample]) -> Vec<u64> {
     let bins = bins(c);
-    let mut observed = vec![0; bins.len() + 2];
+    let mut observed = vec![0; cells(c) + 2];
     for sample in samples {
         assert!(sample.weight.is_finite() && sample.pdf.is_finite() && sample.wi.is_finite(), "{c:?}: {sample:?}");
         if sample.is_delta() {
-            observed[bins.len() + usize::from(sample.flags & SCATTERED_THROUGH != 0)] += 1;
+            observed[cells(c) + usize::from(sample.flags & SCATTERED_THROUGH != 0)] += 1;
         } else if !sample.is_absorbed() {
-            observed[bins.bin(sample.wi)] += 1;
+            let below = sample.wi.y < 0.0;
+            let up = if below { mirrored(sample.wi) } else { sample.wi };
+            observed[bins.bin(up) + if below { bins.len() } else { 0 }] += 1;
         }
     }
     observed
@@ -125,11 +161,11 @@ fn failures(configurations: &[Configuration], results: &[ChiSquare]) -> Vec<Stri
 }
 
 fn scattering() -> TestKernel {
-    TestKernel::new("bsdf.comp")
+    bsdf_kernel()
 }
 
 fn evaluating() -> TestKernel {
-    TestKernel::new("bsdf.comp").define("EVALUATE", 1)
+    bsdf_kernel().define("EVALUATE", 1)
 }
 
 #[test]
@@ -164,10 +200,10 @@ fn a_wrong_normalisation_is_noticed() {
 #[test]
 fn the_quadrature_has_converged() {
     for c in configurations().iter().filter(|c| c.kind == BSDF_METALLIC_ROUGHNESS) {
-        let model = MetallicRoughness::new(c);
+        let model = MetallicRoughness::new(c, c.wo);
         let integrate = |order| {
-            let mut sums = vec![0.0; bins(c).len()];
-            bins(c).nodes(order).iter().for_each(|node| sums[node.bin] += model.pdf(c.wo, node.wi) * node.weight);
+            let mut sums = vec![0.0; cells(c)];
+            nodes(c, order).iter().for_each(|node| sums[node.bin] += model.pdf(c.wo, node.wi) * node.weight);
             sums
         };
         for (coarse, fine) in integrate(ORDER).into_iter().zip(integrate(4 * ORDER)) {
@@ -178,7 +214,7 @@ fn the_quadrature_has_converged() {
     }
 }
 
-/// The continuous part, the delta lobes and what the single-scattering model loses are all there is.
+/// The continuous part, the delta lobes and what is reflected below the surface are all there is.
 #[test]
 fn densities_integrate_to_their_share() {
     let configurations = configurations();
@@ -186,45 +222,79 @@ fn densities_integrate_to_their_share() {
         let continuous: f64 = integrals.pdf.iter().sum();
         let all = continuous + delta_probabilities(c).iter().sum::<f64>();
         assert!(all < 1.0 + 1e-3, "{c:?}: {all}");
-        // The density of visible normals integrates to 1. Along the normal, those beyond 45° are reflected below the
-        // surface: of the GGX lobe that is α²/(1 + α²).
-        if c.wo.y == 1.0 {
-            let specular = if c.alpha == 0.0 { 0.0 } else { MetallicRoughness::new(c).lobes(1.0).x };
-            let a2 = f64::from(c.alpha).powi(2);
-            assert!((all - (1.0 - specular * a2 / (1.0 + a2))).abs() < 2e-4, "{c:?}: {all}");
+        // Along the normal the bound leaves out just what is reflected below the surface, unless it is anisotropic.
+        if c.wo.y == 1.0 && c.stretch == 1.0 {
+            assert!((all - 1.0).abs() < 2e-4, "{c:?}: {all}");
         }
     }
 }
 
-/// No lobe alone gives back more than it gets; a Lambertian surface gives its albedo.
+/// A white furnace: whatever white is made of, a metal, a dielectric over a diffuse or transmitting base or a mixture, gives
+/// back what it gets, at every roughness with a lobe and every angle; a Lambertian surface gives its albedo.
 #[test]
-fn lobes_conserve_energy() {
+fn white_lobes_give_back_what_they_get() {
     let mut configurations = Vec::new();
-    for roughness in ROUGHNESS.into_iter().skip(1) {
-        for cosine in COSINES.into_iter().filter(|cosine| *cosine > 0.01) {
-            let wo = direction(cosine, 1.0);
-            let white = Configuration::metallic_roughness(roughness, 1.0, 1.5, 0.0, wo);
-            configurations.push(Configuration { color: [1.0; 3], ..white });
+    for roughness in ROUGHNESS.into_iter().skip(1).chain([0.03, 0.1, 0.3, 0.55, 0.85]) {
+        for cosine in [1.0, 0.9, 0.6, 0.3, 0.1, 0.03, 0.01] {
+            for (i, (metallic, transmission)) in
+                [(1.0, 0.0), (0.0, 0.0), (0.5, 0.0), (0.0, 0.6), (0.0, 1.0)].into_iter().enumerate()
+            {
+                let wo = direction(cosine, 1.0 + i as f64);
+                for ior in [IORS[i % 4], 1.5] {
+                    let white = Configuration::metallic_roughness(roughness, metallic, ior, transmission, wo);
+                    configurations.push(Configuration { color: [1.0; 3], ..white });
+                }
+            }
         }
     }
+    let mut worst = [0.0_f64; 2];
     for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
-        let albedo = luminance(integrals.albedo);
-        // The quadrature's error and, for the narrowest lobe, that of f32 directions.
-        let slack = 1e-3 + c.rounding(c.wo);
-        assert!(albedo <= 1.0 + slack, "{c:?}: {albedo}");
-        if c.alpha < 0.01 && c.wo.y > 0.7 {
-            assert!((albedo - 1.0).abs() < slack, "a smooth white metal reflects all: {c:?}: {albedo}");
-        }
-        // At α = 1 and normal incidence the integral is elementary.
-        if c.alpha == 1.0 && c.wo.y == 1.0 {
-            assert!((albedo - (1.0 - 2.0_f64.ln())).abs() < 1e-4, "{c:?}: {albedo}");
-        }
+        // The error of f32 directions where the lobe is narrow; that of the quadrature is below 1e-4.
+        let slack = c.rounding(c.wo);
+        let albedo = luminance(integrals.albedo) - 1.0;
+        worst = [worst[0].min(albedo + slack), worst[1].max(albedo - slack)];
+        assert!(albedo <= 1e-3 + slack && albedo >= -1e-2 - slack, "{c:?}: 1 + {albedo:.2e}, slack {slack:.1e}");
     }
+    println!("albedo of white: 1 {:+.2e} to 1 {:+.2e}", worst[0], worst[1]);
     let lambertian =
         [0.9, 1e-3].map(|cosine| Configuration::new(BSDF_LAMBERTIAN, [0.8, 0.5, 0.2], direction(cosine, 2.0)));
     for integrals in integrate(&evaluating(), &lambertian) {
         assert!((integrals.albedo - DVec3::new(0.8, 0.5, 0.2)).abs().max_element() < 1e-4, "{}", integrals.albedo);
     }
+}
+
+/// Without energy given back, a rough white metal keeps 1 − ln 2 along its normal: the furnace would notice.
+#[test]
+fn a_single_scattering_loses_light() {
+    let wo = DVec3::Y;
+    let c = Configuration { color: [1.0; 3], ..Configuration::metallic_roughness(1.0, 1.0, 1.5, 0.0, wo) };
+    let albedo = luminance(integrate(&evaluating(), &[c])[0].albedo);
+    let single = albedo / luminance(MetallicRoughness::new(&c, wo).multiple_scattering(DVec3::ONE));
+    assert!((single - (1.0 - 2.0_f64.ln())).abs() < 1e-3, "{single}");
+}
+
+/// Anisotropic metals never give back more than they get; what the table, made for equal roughness, does not know of them
+/// is lost.
+#[test]
+fn anisotropic_lobes_conserve_energy() {
+    let mut configurations = Vec::new();
+    for (roughness, stretch) in [(0.3, 1.5), (0.3, 0.6), (0.6, 1.3), (0.6, 0.7), (0.85, 1.17), (0.5, 2.0), (0.9, 1.1)] {
+        for (i, cosine) in [1.0, 0.6, 0.3, 0.1].into_iter().enumerate() {
+            for azimuth in [0.0, 0.8, 1.57] {
+                let wo = direction(cosine, azimuth + 0.01 * i as f64);
+                let metal = Configuration::metallic_roughness(roughness, 1.0, 1.5, 0.0, wo);
+                configurations.push(Configuration { color: [1.0; 3], stretch, ..metal });
+            }
+        }
+    }
+    let mut worst = [0.0_f64; 2];
+    for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
+        let albedo = luminance(integrals.albedo) - 1.0;
+        println!("{:?} {:.2} {:+.2e}", c.alphas(), c.wo.y, albedo);
+        worst = [worst[0].min(albedo), worst[1].max(albedo)];
+    }
+    println!("albedo of white anisotropic metals: 1 {:+.2e} to 1 {:+.2e}", worst[0], worst[1]);
+    assert!(worst[1] <= 1e-3 && worst[0] > -0.07, "{worst:?}");
 }
 
 /// At directions that were scattered: the density that came with a sample is the one that is evaluated, and the weight is
@@ -249,16 +319,27 @@ fn check_sample(c: &Configuration, sample: &Sample, value: &Value) {
     let close = |a: f64, b: f64, tolerance: f64| (a - b).abs() <= tolerance * a.abs().max(b.abs());
     let all_close = |a: DVec3, b: DVec3, tolerance| (0..3).all(|i| close(a[i], b[i], tolerance));
     let context = || format!("{c:?}: {sample:?}, {value:?}");
-    assert!(sample.wi.y > 0.0 && (sample.wi.length() - 1.0).abs() < 1e-6, "{}", context());
-    assert!(close(sample.pdf, value.pdf, 1e-5), "{}", context());
-    assert!(all_close(sample.weight, value.f * (sample.wi.y / value.pdf), 1e-5), "{}", context());
+    let below = sample.flags & SCATTERED_THROUGH != 0;
+    assert!((sample.wi.y < 0.0) == below && (sample.wi.length() - 1.0).abs() < 1e-6, "{}", context());
     // Fused or not, D amplifies the rounding of the half vector.
     let tolerance = 2e-5 + 4.0 * c.rounding(sample.wi);
-    assert!(all_close(value.f, value.reverse_f, tolerance), "not reciprocal: {}", context());
-    if c.kind == BSDF_METALLIC_ROUGHNESS {
-        let model = MetallicRoughness::new(c);
-        assert!(close(value.pdf, model.pdf(c.wo, sample.wi), tolerance), "{}", context());
-        assert!(all_close(value.f, model.evaluate(c.wo, sample.wi), tolerance), "{}", context());
+    assert!(close(sample.pdf, value.pdf, tolerance), "{}", context());
+    assert!(all_close(sample.weight, value.f * (sample.wi.y.abs() / value.pdf), tolerance), "{}", context());
+    if c.kind != BSDF_METALLIC_ROUGHNESS {
+        assert!(all_close(value.f, value.reverse_f, tolerance), "not reciprocal: {}", context());
+        return;
+    }
+    // The table is read between nodes: rounding of its coordinates moves what is read.
+    let model = MetallicRoughness::new(c, c.wo);
+    assert!(close(value.pdf, model.pdf(c.wo, sample.wi), tolerance), "{}", context());
+    assert!(all_close(value.f, model.evaluate(c.wo, sample.wi), tolerance), "{}", context());
+    // A metal is reciprocal but for the light of several scatterings that is given back by wo's albedo.
+    if c.metallic == 1.0 {
+        let reverse = MetallicRoughness::new(c, sample.wi);
+        let color = DVec3::from(c.color.map(f64::from));
+        let (one, other) = (model.multiple_scattering(color), reverse.multiple_scattering(color));
+        let tolerance = 2.0 * tolerance;
+        assert!(all_close(value.f / one, value.reverse_f / other, tolerance), "not reciprocal: {}", context());
     }
 }
 

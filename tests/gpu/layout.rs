@@ -126,7 +126,7 @@ fn render_constants_fields() -> Vec<Field> {
     rust_fields!(RenderConstants: camera_origin, lens_radius, camera_right, focus_distance, camera_up, projection,
         camera_forward, unused, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
         materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
-        environment_height, environment_marginal_word, environment_conditional_word, unused_too, environment_radiance,
+        environment_height, environment_marginal_word, environment_conditional_word, ggx_albedo, environment_radiance,
         environment_cos, scene_center, environment_sin)
 }
 

@@ -22,7 +22,7 @@ mutations! {
         caught by "bsdf_chi_square::scattered_directions_follow_the_pdf";
     /// Light that arrives at a slant counts as much as from above.
     missing_cosine: "path_trace.comp",
-        "bsdf_evaluate(surface.bsdf, wo, wi) * (wi.y * weight) * light.radiance" =>
+        "bsdf_evaluate(surface.bsdf, wo, wi) * (abs(wi.y) * weight) * light.radiance" =>
         "bsdf_evaluate(surface.bsdf, wo, wi) * weight * light.radiance",
         caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
     /// The columns of the environment are drawn from the row below.

@@ -50,7 +50,8 @@ impl Loader<'_> {
             self.read_emission(place, &mut material, has_texcoords)?;
         }
         if material.bsdf == Bsdf::MetallicRoughness {
-            self.read_transmission(place, &mut material)?;
+            self.read_specular(place, &mut material, has_texcoords)?;
+            self.read_transmission(place, &mut material, has_texcoords)?;
         }
         self.warn_of_material(place, &material)?;
         Ok(material)
@@ -110,13 +111,24 @@ impl Loader<'_> {
         Ok(1.5)
     }
 
+    fn read_specular(&mut self, place: &Json<'_>, material: &mut Material, has_texcoords: bool) -> SceneResult<()> {
+        let Some(extension) = place.extension("KHR_materials_specular")? else { return Ok(()) };
+        material.specular = extension.number_in("specularFactor", 1.0, 0.0, 1.0)? as f32;
+        material.specular_color =
+            extension.color("specularColorFactor", [1.0; 3], f64::from(f32::MAX))?.map(|c| c as f32);
+        if material.specular > 0.0 {
+            material.specular_texture = self.texture(extension.get("specularTexture")?, has_texcoords)?;
+            material.specular_color_texture = self.texture(extension.get("specularColorTexture")?, has_texcoords)?;
+        }
+        Ok(())
+    }
+
     /// KHR_materials_transmission is thin-walled; only a volume would make it solid.
-    fn read_transmission(&mut self, place: &Json<'_>, material: &mut Material) -> SceneResult<()> {
+    fn read_transmission(&mut self, place: &Json<'_>, material: &mut Material, has_texcoords: bool) -> SceneResult<()> {
         let Some(extension) = place.extension("KHR_materials_transmission")? else { return Ok(()) };
         material.transmission = extension.number_in("transmissionFactor", 0.0, 0.0, 1.0)? as f32;
-        if extension.get("transmissionTexture")?.is_some() && material.transmission > 0.0 {
-            let subject = "transmission textures are not supported yet: the factor alone is used";
-            self.warnings.add(subject, &extension.pointer);
+        if material.transmission > 0.0 {
+            material.transmission_texture = self.texture(extension.get("transmissionTexture")?, has_texcoords)?;
         }
         if material.transmission > 0.0 && place.extension("KHR_materials_volume")?.is_some() {
             let subject =
