@@ -15,6 +15,7 @@ use sunfleck::{Error, Result};
 
 use super::bench_report::{heading, print_measurement};
 use super::estimator_args::EstimatorArgs;
+use super::given_flags::GivenFlags;
 use super::progress::Progress;
 use super::render::load_scene;
 use super::{bench_compare, bench_suite, interrupt, parse, print_json};
@@ -22,6 +23,9 @@ use super::{bench_compare, bench_suite, interrupt, parse, print_json};
 const EXAMPLES: &str = "\
 Errors are to the reference, in linear radiance: MSE, relMSE ((a - b)^2 / (b^2 + 0.01^2)) and FLIP. The reference's own
 noise is subtracted from MSE and relMSE, not from FLIP.
+
+Flags beside a SUITE hold for each of its benches and override what the suite says; those that name something of one
+scene (--camera, --reference, --compare) are refused there.
 
 Examples:
   sunfleck bench                                     the Cornell box
@@ -35,6 +39,8 @@ Examples:
 #[derive(Args, Clone, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct BenchArgs {
+    #[command(flatten)]
+    pub(super) given: GivenFlags,
     /// A scene as `render` takes it; or a suite: a .json file, or the name of one in benches/suites.
     #[arg(value_name = "SCENE|SUITE", default_value = "cornell")]
     pub(super) scene: String,

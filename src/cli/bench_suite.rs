@@ -1,6 +1,7 @@
 //! Suites of `sunfleck bench`: a JSON file that lists scenes with flags.
 
-use std::fmt::Write;
+use std::ffi::OsString;
+use std::fmt::{Display, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Command, FromArgMatches};
@@ -10,7 +11,8 @@ use sunfleck::Error;
 
 use super::bench::{BenchArgs, Report, bench, write_text};
 use super::bench_report::{bias, seconds};
-use super::print_json;
+use super::given_flags::GivenFlags;
+use super::{not_built, print_json};
 
 /// A suite's file.
 #[derive(Debug, Deserialize)]
@@ -43,10 +45,16 @@ pub(super) fn find(argument: &str) -> Option<PathBuf> {
     (!argument.contains(['/', '\\']) && named.is_file()).then_some(named)
 }
 
-/// Runs every bench of the suite. `--output`, `--quiet` and `--strict` hold for all; everything else is the suite's.
+/// Flags that name something of one scene: beside a suite they are refused.
+const OF_ONE_SCENE: &[&str] = &["camera", "reference", "compare"];
+/// Flags that concern the whole run: in a suite's file they are refused.
+const OF_THE_RUN: &[&str] = &["output", "json", "quiet", "strict", "compare"];
+
+/// Runs every bench of the suite. What the command line gives holds for all and overrides what the suite says.
 pub(super) fn run(path: &Path, args: &BenchArgs) -> anyhow::Result<()> {
-    if args.compare.is_some() {
-        return Err(Error::Usage("--compare takes a scene, not a suite".to_owned()).into());
+    if let Some(flag) = args.given.first_of(OF_ONE_SCENE) {
+        let message = format!("{flag} is for one scene, and {} is a suite of them", path.display());
+        return Err(Error::Usage(message).into());
     }
     let suite = read(path)?;
     let benches: Result<Vec<_>, _> = suite.benches.iter().map(|entry| entry.arguments(path, args)).collect();
@@ -79,19 +87,36 @@ fn read(path: &Path) -> sunfleck::Result<Suite> {
 }
 
 impl Entry {
+    /// What the suite says, under what stands on the command line.
     fn arguments(&self, suite: &Path, args: &BenchArgs) -> sunfleck::Result<BenchArgs> {
-        let command = BenchArgs::augment_args(Command::new("bench").no_binary_name(true));
-        let words = std::iter::once(&self.scene).chain(&self.flags);
-        let parsed = command.try_get_matches_from(words).and_then(|matches| BenchArgs::from_arg_matches(&matches));
-        let mut parsed = parsed.map_err(|e| Error::input(suite, format!("bench '{}': {e}", self.name)))?;
+        let own = parse(std::iter::once(OsString::from(&self.scene)).chain(self.flags.iter().map(OsString::from)))
+            .map_err(|e| self.error(suite, e))?;
+        if let Some(flag) = own.given.first_of(OF_THE_RUN) {
+            return Err(self.error(suite, format!("{flag} is for the command line, not for a bench of a suite")));
+        }
+        let words = own.given.words_under(&args.given, &command());
+        let words = words.into_iter().chain(args.given.words_under(&GivenFlags::default(), &command()));
+        let mut parsed = parse(std::iter::once(OsString::from(&self.scene)).chain(words))
+            .map_err(|e| Error::Usage(format!("bench '{}': {e}", self.name)))?;
+        not_built::refuse_for_bench(&parsed)?;
         if Path::new(&self.scene).extension().is_some() {
             let folder = suite.parent().unwrap_or(Path::new(""));
             parsed.scene = folder.join(&self.scene).display().to_string();
         }
-        parsed.output.clone_from(&args.output);
-        (parsed.quiet, parsed.strict) = (args.quiet, args.strict);
         Ok(parsed)
     }
+
+    fn error(&self, suite: &Path, message: impl Display) -> Error {
+        Error::input(suite, format!("bench '{}': {message}", self.name))
+    }
+}
+
+fn command() -> Command {
+    BenchArgs::augment_args(Command::new("bench").no_binary_name(true))
+}
+
+fn parse(words: impl Iterator<Item = OsString>) -> Result<BenchArgs, clap::Error> {
+    command().try_get_matches_from(words).and_then(|matches| BenchArgs::from_arg_matches(&matches))
 }
 
 /// The results as a page: a table, then the plots.

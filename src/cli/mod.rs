@@ -8,6 +8,7 @@ mod bench_suite;
 mod compare;
 mod devices;
 mod estimator_args;
+mod given_flags;
 mod info;
 mod interrupt;
 mod merge;

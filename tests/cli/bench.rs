@@ -123,11 +123,37 @@ fn a_suite_measures_its_scenes_and_writes_an_index() {
 }
 
 #[test]
+fn flags_beside_a_suite_hold_for_each_of_its_benches() {
+    let folder = tempfile::tempdir().unwrap();
+    let suite = r#"{"about": "A test.", "benches": [
+        {"name": "one", "scene": "cornell", "flags": ["--spp", "64..256", "--reference=gone.exr", "--resolution", "8x8"]},
+        {"name": "two", "scene": "cornell", "flags": ["--seeds", "3", "--max-bounces=1", "--spp=2..8"]}
+    ]}"#;
+    std::fs::write(folder.path().join("suite.json"), suite).unwrap();
+    let given = ["--spp=2..4", "--seeds=2", "--reference-spp=16", "--resolution=16x16", "--light-sampling=nee"];
+    let (code, report, stderr) =
+        bench(folder.path(), &[&["suite.json", "--trace=bvh", "--json", "--quiet"], &given[..]].concat());
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    let flags =
+        [vec!["--light-sampling=nee", "--trace=bvh"], vec!["--max-bounces=1", "--light-sampling=nee", "--trace=bvh"]];
+    for (report, flags) in report["benches"].as_array().unwrap().iter().zip(flags) {
+        assert_eq!((&report["width"], &report["flags"]), (&16.into(), &flags.into()));
+        let points = report["points"].as_array().unwrap();
+        assert_eq!((points.len(), points[0]["runs"].as_array().unwrap().len()), (2, 2), "{report}");
+        assert!(report["reference"]["description"].as_str().unwrap().contains(" 16 samples"), "{report}");
+    }
+}
+
+#[test]
 fn wrong_input_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bad.json"), r#"{"about": "", "benches": [{"nam": 1}]}"#).unwrap();
     let flag = r#"{"about": "", "benches": [{"name": "a", "scene": "cornell", "flags": ["--sp"]}]}"#;
     std::fs::write(folder.path().join("flag.json"), flag).unwrap();
+    for (name, flag) in [("json", "--json"), ("sobol", "--sampler=sobol")] {
+        let text = format!(r#"{{"about": "", "benches": [{{"name": "a", "scene": "cornell", "flags": ["{flag}"]}}]}}"#);
+        std::fs::write(folder.path().join(format!("{name}.json")), text).unwrap();
+    }
     std::fs::write(folder.path().join("no.exr"), "not an image").unwrap();
     for (arguments, code, word) in [
         (&["--spp", "8..4"] as &[&str], 2, "MIN"),
@@ -137,7 +163,11 @@ fn wrong_input_is_refused_by_name() {
         (&["--compare", "no-such-program"], 2, "neither a program nor flags"),
         (&["--compare", "--light-sampling all", "--resolution", "8x8"], 2, "mis, mixture, nee, bsdf"),
         (&["--compare", "--light-sampling 'bsdf"], 2, "quote"),
-        (&["bad.json", "--compare", "--mis balance"], 2, "suite"),
+        (&["bad.json", "--compare", "--mis balance"], 2, "--compare is for one scene"),
+        (&["bad.json", "--camera", "0"], 2, "--camera is for one scene"),
+        (&["bad.json", "--reference", "no.exr"], 2, "--reference is for one scene"),
+        (&["json.json"], 3, "bench 'a': --json is for the command line"),
+        (&["sobol.json"], 2, "--sampler sobol is not built yet"),
         (&["no-such-scene.gltf"], 3, "no-such-scene.gltf"),
         (&["--reference", "no-such.exr", "--resolution", "8x8"], 3, "no-such.exr"),
         (&["--reference", "no.exr", "--resolution", "8x8"], 3, "no.exr"),
