@@ -8,6 +8,7 @@ pub mod builder;
 pub mod gpu;
 pub mod kernel;
 pub mod mutation;
+pub mod random;
 pub mod reference;
 pub mod scenes;
 pub mod statistics;
