@@ -8,11 +8,12 @@ use clap::{Args, Command, FromArgMatches};
 use serde::Deserialize;
 use serde_json::json;
 use sunfleck::Error;
+use sunfleck::bench::plot;
 
 use super::bench::{BenchArgs, Report, bench, write_text};
-use super::bench_report::{bias, seconds};
+use super::bench_report::{bias, efficiency, seconds};
 use super::given_flags::GivenFlags;
-use super::{not_built, print_json};
+use super::{interrupt, not_built, print_json};
 
 /// A suite's file.
 #[derive(Debug, Deserialize)]
@@ -46,9 +47,9 @@ pub(super) fn find(argument: &str) -> Option<PathBuf> {
 }
 
 /// Flags that name something of one scene: beside a suite they are refused.
-const OF_ONE_SCENE: &[&str] = &["camera", "reference", "compare"];
+const OF_ONE_SCENE: &[&str] = &["camera", "reference", "plot", "compare"];
 /// Flags that concern the whole run: in a suite's file they are refused.
-const OF_THE_RUN: &[&str] = &["output", "json", "quiet", "strict", "compare"];
+const OF_THE_RUN: &[&str] = &["output", "json", "quiet", "strict", "plot", "compare"];
 
 /// Runs every bench of the suite. What the command line gives holds for all and overrides what the suite says.
 pub(super) fn run(path: &Path, args: &BenchArgs) -> anyhow::Result<()> {
@@ -58,16 +59,31 @@ pub(super) fn run(path: &Path, args: &BenchArgs) -> anyhow::Result<()> {
     }
     let suite = read(path)?;
     let benches: Result<Vec<_>, _> = suite.benches.iter().map(|entry| entry.arguments(path, args)).collect();
-    let mut reports = Vec::new();
+    let (mut reports, mut interrupted) = (Vec::new(), false);
     for (entry, arguments) in suite.benches.iter().zip(benches?) {
-        reports.push((entry, bench(&arguments, &entry.name)?));
+        match bench(&arguments, &entry.name) {
+            Ok(report) => {
+                interrupted = report.measurement.interrupted;
+                reports.push((entry, report));
+            }
+            Err(error) if matches!(error.downcast_ref(), Some(Error::Interrupted)) => interrupted = true,
+            Err(error) => return Err(error),
+        }
+        // Also where the signal came between two benches.
+        interrupted |= interrupt::requested() && reports.len() < suite.benches.len();
+        if interrupted {
+            break;
+        }
     }
     if let Some(folder) = &args.output {
         write_text(&folder.join("README.md"), &index(path, &suite, &reports))?;
     }
     if args.json {
         let values: Vec<_> = reports.iter().map(|(_, report)| &report.value).collect();
-        print_json(&json!({ "suite": path.display().to_string(), "benches": values }))?;
+        print_json(&json!({ "suite": path.display().to_string(), "interrupted": interrupted, "benches": values }))?;
+    }
+    if interrupted {
+        return Err(Error::Interrupted.into());
     }
     reports.iter().try_for_each(|(_, report)| report.verdict(args.strict)).map_err(anyhow::Error::from)
 }
@@ -126,8 +142,11 @@ fn index(path: &Path, suite: &Suite, reports: &[(&Entry, Report)]) -> String {
         let processor = m.processor.as_deref().unwrap_or("unknown processor");
         let _ = writeln!(page, "\n{}; {}; {processor}.\n", m.device, m.driver);
     }
-    page.push_str("| scene | spp | time | MSE | relMSE | FLIP | slope of MSE over spp | bias |\n");
-    page.push_str("|---|---|---|---|---|---|---|---|\n");
+    if reports.len() < suite.benches.len() {
+        let _ = writeln!(page, "Interrupted: {} of {} benches.\n", reports.len(), suite.benches.len());
+    }
+    page.push_str("| scene | spp | time | MSE | relMSE | FLIP | 1/(MSE · s) | slope of MSE over spp | bias |\n");
+    page.push_str("|---|---|---|---|---|---|---|---|---|\n");
     for (entry, Report { measurement: m, .. }) in reports {
         let Some(point) = m.points.last() else { continue };
         let flip = point.flip.map_or("–".to_owned(), |flip| format!("{:.4}", flip.mean));
@@ -136,16 +155,17 @@ fn index(path: &Path, suite: &Suite, reports: &[(&Entry, Report)]) -> String {
         });
         let _ = writeln!(
             page,
-            "| [{name}]({name}.json) | {} | {} | {:.3e} | {:.3e} | {flip} | {slope} | {} |",
-            point.spp,
+            "| [{name}]({name}.json) | {} | {} | {:.3e} | {:.3e} | {flip} | {} | {slope} | {} |",
+            point.spp_label(),
             seconds(&point.seconds),
             point.mse.mean,
             point.rel_mse.mean,
-            bias(&m.bias),
+            efficiency(point),
+            bias(m.bias.as_ref()),
             name = entry.name,
         );
     }
-    for (entry, _) in reports {
+    for (entry, _) in reports.iter().filter(|(_, report)| plot::can_draw(&report.measurement)) {
         let _ = writeln!(page, "\n![{name}]({name}.svg)", name = entry.name);
     }
     page

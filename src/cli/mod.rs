@@ -3,6 +3,7 @@
 
 mod bench;
 mod bench_compare;
+mod bench_compare_report;
 mod bench_report;
 mod bench_suite;
 mod compare;
