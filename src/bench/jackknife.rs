@@ -20,6 +20,13 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// With an independent error that all seeds share (that of the reference), by its standard error and the statistic's
+    /// derivative in it.
+    #[must_use]
+    pub fn with_common_error(self, derivative: f64, standard_error: f64) -> Self {
+        Self { standard_error: self.standard_error.hypot(derivative * standard_error), ..self }
+    }
+
     /// Student's t interval.
     pub fn interval(&self) -> Interval {
         let half = t_quantile(0.5 + 0.5 * CONFIDENCE, self.degrees_of_freedom) * self.standard_error;

@@ -69,6 +69,7 @@ pub fn measure(
     let (mut tracer, _, prepare_seconds) = path_tracer_on(open, scene, settings)?;
     let images = Images::render(&mut tracer, settings, plan, &reference, &mut work)?;
     let points: Vec<_> = images.rows.into_iter().map(Point::new).collect();
+    let common_error = reference.about.common_error();
     Ok(Measurement {
         device: open.gpu.info.name.clone(),
         driver: open.gpu.info.driver.clone(),
@@ -78,8 +79,8 @@ pub fn measure(
         width: settings.width,
         height: settings.height,
         interrupted: images.interrupted,
-        mse_over_spp: mse_over(&points, |run| run.spp),
-        mse_over_seconds: mse_over(&points, |run| run.seconds),
+        mse_over_spp: mse_over(&points, |run| run.spp, common_error),
+        mse_over_seconds: mse_over(&points, |run| run.seconds, common_error),
         points,
         bias: (images.mean.count() >= 2).then(|| find_bias(&images.mean.finish(), &reference.image)),
         reference: reference.about,

@@ -52,37 +52,51 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// From the pairs of every row, of the same seeds in the same order.
+    /// From the pairs of every row, of the same seeds in the same order. `common_error` is the standard error that all
+    /// MSEs share, since they have one reference.
     ///
     /// # Panics
     /// If rows have different numbers of pairs.
-    pub fn of(rows: &[Vec<Pair>]) -> Self {
-        Self { rows: rows.iter().map(|pairs| Ratios::of(&[pairs])).collect(), overall: Ratios::of(rows) }
+    pub fn of(rows: &[Vec<Pair>], common_error: f64) -> Self {
+        let of_row = |pairs| Ratios::of(&[pairs], common_error);
+        Self { rows: rows.iter().map(of_row).collect(), overall: Ratios::of(rows, common_error) }
     }
 }
 
 impl Ratios {
     /// The geometric means over the rows. The rows of one seed share samples and depend on each other; so it is seeds that
     /// the jackknife leaves out, from all rows at once.
-    fn of<P: AsRef<[Pair]>>(rows: &[P]) -> Self {
+    fn of<P: AsRef<[Pair]>>(rows: &[P], common_error: f64) -> Self {
         let rows: Vec<&[Pair]> = rows.iter().map(AsRef::as_ref).collect();
         let seeds = rows.first().map_or(0, |pairs| pairs.len());
         assert!(rows.iter().all(|pairs| pairs.len() == seeds), "every row has one pair a seed");
         let with_error: Vec<_> = rows.iter().copied().filter(|pairs| errors_stay_positive(pairs)).collect();
-        let interval = |rows: &[&[Pair]], log_ratio: &dyn Fn(&[Pair], Option<usize>) -> f64| {
-            let mean = |left_out| rows.iter().map(|pairs| log_ratio(pairs, left_out)).sum::<f64>() / rows.len() as f64;
-            jackknife(seeds, mean).map(|estimate| estimate.interval().map(f64::exp))
+        let mean = |rows: &[&[Pair]], of: &dyn Fn(&[Pair]) -> f64| {
+            rows.iter().map(|pairs| of(pairs)).sum::<f64>() / rows.len() as f64
         };
+        let interval = |rows: &[&[Pair]], log_ratio: &dyn Fn(&[Pair], Option<usize>) -> f64, derivative: f64| {
+            let estimate = jackknife(seeds, |left_out| mean(rows, &|pairs| log_ratio(pairs, left_out)))?;
+            Some(estimate.with_common_error(derivative, common_error).interval().map(f64::exp))
+        };
+        // Of the logarithm of the ratio of MSEs in a common shift of them.
+        let derivative = mean(&with_error, &|pairs| {
+            let [a, b] = errors(pairs).map(|mse| 1.0 / mean_without(&mse, None));
+            b - a
+        });
         let render = |pairs: &[Pair], left_out| log_time_ratio(pairs, left_out, |sample| sample.render_seconds);
         Self {
-            render_seconds: interval(&rows, &render),
-            process_seconds: interval(&rows, &|pairs, left_out| {
-                log_time_ratio(pairs, left_out, |sample| sample.process_seconds)
-            }),
-            mse: interval(&with_error, &log_error_ratio),
-            efficiency: interval(&with_error, &|pairs, left_out| {
-                -log_error_ratio(pairs, left_out) - render(pairs, left_out)
-            }),
+            render_seconds: interval(&rows, &render, 0.0),
+            process_seconds: interval(
+                &rows,
+                &|pairs, left_out| log_time_ratio(pairs, left_out, |sample| sample.process_seconds),
+                0.0,
+            ),
+            mse: interval(&with_error, &log_error_ratio, derivative),
+            efficiency: interval(
+                &with_error,
+                &|pairs, left_out| -log_error_ratio(pairs, left_out) - render(pairs, left_out),
+                derivative,
+            ),
         }
     }
 

@@ -80,11 +80,12 @@ fn efficiency(mse: &[f64], seconds: &[f64]) -> Estimate {
     Estimate { estimate, standard_error, degrees_of_freedom: mse.len() as f64 - 1.0 }
 }
 
-/// MSE over x as a power law; `None` where none fits ([`fit_power_law`]).
-pub fn mse_over(points: &[Point], x: fn(&SeedRun) -> f64) -> Option<PowerLaw> {
+/// MSE over x as a power law; `None` where none fits ([`fit_power_law`]). `common_error` is the standard error that all
+/// MSEs share, since they have one reference.
+pub fn mse_over(points: &[Point], x: fn(&SeedRun) -> f64, common_error: f64) -> Option<PowerLaw> {
     let row = |point: &Point| Row {
         x: point.runs.iter().map(x).collect(),
         y: point.runs.iter().map(|run| run.errors.mse).collect(),
     };
-    fit_power_law(&points.iter().map(row).collect::<Vec<_>>())
+    fit_power_law(&points.iter().map(row).collect::<Vec<_>>(), common_error)
 }

@@ -219,7 +219,7 @@ fn finish(
     rows: &[Vec<Pair>],
     interrupted: bool,
 ) -> anyhow::Result<()> {
-    let comparison = Comparison::of(rows);
+    let comparison = Comparison::of(rows, reference.about.common_error());
     let described: Vec<(Value, BiasVerdict)> = sides
         .into_iter()
         .map(|side| {

@@ -47,7 +47,7 @@ pub(super) fn text(heading: &str, m: &Measurement, start_up_seconds: f64) -> Str
     for point in &m.points {
         let _ = writeln!(out, "{}", row(point));
     }
-    if m.points.iter().any(|point| !point.in_fit) {
+    if m.points.iter().any(is_at_noise) {
         let _ = writeln!(out, "  * the mean MSE is not safely above the reference's noise: left out of the slopes");
     }
     if m.interrupted {
@@ -58,10 +58,21 @@ pub(super) fn text(heading: &str, m: &Measurement, start_up_seconds: f64) -> Str
     let _ = writeln!(out, "  MSE over spp   {}", slope(m.mse_over_spp.as_ref()));
     let _ = writeln!(out, "  MSE over time  {}", slope(m.mse_over_seconds.as_ref()));
     let _ = writeln!(out, "  bias           {}", bias(m.bias.as_ref()));
+    if reference_is_short(m) {
+        let _ = writeln!(
+            out,
+            "note: the reference has fewer samples than the last row's images together: rare paths that it lacks look like bias"
+        );
+    }
     if m.non_finite_samples > 0 {
         let _ = writeln!(out, "warning: {} samples were NaN or infinite; each is a bug", m.non_finite_samples);
     }
     out
+}
+
+/// The bias test takes means as normal, and the mean of fewer samples is further from that.
+fn reference_is_short(m: &Measurement) -> bool {
+    m.points.last().is_some_and(|last| m.reference.spp.is_some_and(|spp| spp < last.spp * last.runs.len() as f64))
 }
 
 fn header() -> String {
@@ -77,8 +88,13 @@ fn row(point: &Point) -> String {
         scientific(&point.rel_mse),
         point.flip.as_ref().map_or("too large".to_owned(), plain),
         efficiency(point),
-        if point.in_fit { "" } else { " *" },
+        if is_at_noise(point) { " *" } else { "" },
     )
+}
+
+/// A single seed does not tell.
+fn is_at_noise(point: &Point) -> bool {
+    !point.in_fit && point.runs.len() > 1
 }
 
 fn plain(summary: &Summary) -> String {

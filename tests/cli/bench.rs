@@ -58,7 +58,7 @@ fn bench_measures_a_scene_and_writes_its_files() {
 }
 
 #[test]
-fn times_are_rows_and_plots_are_named_files() {
+fn times_are_rows_plots_are_named_files_and_short_references_are_noted() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["--times", "0.2s..0.4s", "--seeds", "2", "--resolution", "16x16", "--json"];
     let plots = ["--plot", "error.svg", "--plot", "error.PNG"];
@@ -74,6 +74,8 @@ fn times_are_rows_and_plots_are_named_files() {
     assert_eq!(report["points"].as_array().unwrap().len(), 2);
     assert!(std::fs::read_to_string(folder.path().join("error.svg")).unwrap().contains("render time in seconds"));
     assert!(image::open(folder.path().join("error.PNG")).unwrap().width() > 500);
+    let (_, _, stderr) = bench(folder.path(), &["--spp=8..8", "--seeds=2", "--resolution=8x8", "--reference-spp=8"]);
+    assert!(stderr.contains("note: the reference has fewer samples"), "{stderr}");
     let (code, _, stderr) = bench(folder.path(), &["--times", "1ms..1ms", "--resolution", "1024x1024"]);
     assert!(code == 2 && stderr.contains("not every pixel gets a sample"), "{stderr}");
 }

@@ -3,7 +3,7 @@
 
 use sunfleck::bench::jackknife::{jackknife, mean_without, stays_positive};
 use sunfleck::bench::measure::keep_common_seeds;
-use sunfleck::bench::pairs::{Comparison, Pair, Sample, a_first};
+use sunfleck::bench::pairs::{Comparison, Pair, Ratios, Sample, a_first};
 use sunfleck::bench::point::{Point, SeedRun, mse_over};
 use sunfleck::bench::power_law::{Row, fit_power_law};
 use sunfleck::bench::reference::Errors;
@@ -43,16 +43,16 @@ fn the_slope_is_recovered_and_its_interval_covers() {
     let mut random = Random(2);
     let mut hits = 0;
     for _ in 0..1000 {
-        let law = fit_power_law(&rows(&mut random, 100, 0.0)).unwrap();
+        let law = fit_power_law(&rows(&mut random, 100, 0.0), 0.0).unwrap();
         assert!((law.slope.estimate + 1.0).abs() < 0.25, "{law:?}");
         hits += u32::from(law.slope.contains(-1.0));
     }
     assert_covers(hits);
     let row = |x: f64, y: f64| Row { x: vec![x; 2], y: vec![y; 2] };
-    let exact = fit_power_law(&[row(1.0, 2.0), row(4.0, 1.0)]).unwrap();
+    let exact = fit_power_law(&[row(1.0, 2.0), row(4.0, 1.0)], 0.0).unwrap();
     assert!((exact.slope.estimate + 0.5).abs() < 1e-12 && (exact.at(16.0) - 0.5).abs() < 1e-12, "{exact:?}");
-    assert!(fit_power_law(&[row(1.0, 2.0)]).is_none(), "one row has no slope");
-    assert!(fit_power_law(&[Row { x: vec![1.0], y: vec![1.0] }, Row { x: vec![2.0], y: vec![1.0] }]).is_none());
+    assert!(fit_power_law(&[row(1.0, 2.0)], 0.0).is_none(), "one row has no slope");
+    assert!(fit_power_law(&[Row { x: vec![1.0], y: vec![1.0] }, Row { x: vec![2.0], y: vec![1.0] }], 0.0).is_none());
 }
 
 #[test]
@@ -60,14 +60,51 @@ fn an_error_below_zero_does_not_take_the_slope_away() {
     let mut random = Random(8);
     let (mut hits, mut with_negative) = (0, 0);
     for _ in 0..1000 {
-        // A tenth of the mean at 32 samples per pixel is 0.0156; the noise there is as large as the mean itself.
+        // The mean at 32 samples per pixel is 0.156: there noise of 0.12 makes one error in ten negative.
         let rows = rows(&mut random, 100, 0.12);
         with_negative += u32::from(rows.iter().any(|row| row.y.iter().any(|y| *y <= 0.0)));
-        let law = fit_power_law(&rows).unwrap();
+        let law = fit_power_law(&rows, 0.0).unwrap();
         hits += u32::from(law.slope.contains(-1.0));
     }
     assert!(with_negative > 500, "{with_negative} of 1000 have an error below zero");
     assert_covers(hits);
+}
+
+#[test]
+fn the_error_of_the_reference_widens_the_interval_of_the_slope() {
+    let mut random = Random(12);
+    // At 32 samples per pixel the mean is 0.156; the shift that all rows share is 15 % of that.
+    let common_error = 0.023;
+    let (mut hits, mut without) = (0, 0);
+    for _ in 0..1000 {
+        let shift = common_error * random.normal();
+        let mut rows = rows(&mut random, 1000, 0.0);
+        rows.iter_mut().flat_map(|row| &mut row.y).for_each(|y| *y += shift);
+        hits += u32::from(fit_power_law(&rows, common_error).unwrap().slope.contains(-1.0));
+        without += u32::from(fit_power_law(&rows, 0.0).unwrap().slope.contains(-1.0));
+    }
+    // By Student's t with 7 degrees of freedom, where the shift is normal: more often than 95 of 100.
+    assert!((940..=1000).contains(&hits), "{hits} of 1000");
+    assert!(without < 800, "the test could not tell: {without} of 1000");
+}
+
+#[test]
+fn the_error_of_the_reference_widens_the_interval_of_a_ratio() {
+    let mut random = Random(13);
+    let (common_error, mut hits, mut without) = (0.01, 0, 0);
+    for _ in 0..1000 {
+        let shift = common_error * random.normal();
+        let mut pairs = pairs(&mut random, 0.5);
+        pairs.iter_mut().flat_map(|pair| [&mut pair.a, &mut pair.b]).for_each(|sample| sample.mse += shift);
+        let holds = |error: f64| {
+            let Ratios { mse, efficiency, .. } = Comparison::of(&[pairs.clone()], error).overall;
+            mse.unwrap().contains(0.5) && efficiency.unwrap().contains(4.0)
+        };
+        hits += u32::from(holds(common_error));
+        without += u32::from(holds(0.0));
+    }
+    assert!((940..=1000).contains(&hits), "{hits} of 1000");
+    assert!(without < 800, "the test could not tell: {without} of 1000");
 }
 
 #[test]
@@ -77,9 +114,9 @@ fn a_row_whose_mean_is_not_above_zero_is_left_out() {
     assert!(!stays_positive(&[2.0, -0.5, -0.5]), "its mean is below zero without the first");
     let row = |x: f64, y: [f64; 2]| Row { x: vec![x; 2], y: y.to_vec() };
     let rows = [row(1.0, [8.0, 8.0]), row(4.0, [2.0, 2.0]), row(16.0, [0.5, -0.6])];
-    let law = fit_power_law(&rows).unwrap();
+    let law = fit_power_law(&rows, 0.0).unwrap();
     assert!((law.slope.estimate + 1.0).abs() < 1e-12 && law.rows == 2, "{law:?}");
-    assert!(fit_power_law(&rows[1..]).is_none());
+    assert!(fit_power_law(&rows[1..], 0.0).is_none());
 }
 
 fn errors(mse: f64) -> Errors {
@@ -115,7 +152,7 @@ fn a_row_of_times_has_the_samples_it_reached() {
     let point = |n: f64| Point::new(vec![run(0, 10.0 * n, 1.0 * n, 0.2 / n), run(1, 15.5 * n, 1.1 * n, 0.1 / n)]);
     let points = [point(1.0), point(2.0)];
     assert_eq!((points[0].spp_label(), points[1].spp_label()), ("12.8".to_owned(), "25.5".to_owned()));
-    for law in [mse_over(&points, |run| run.spp), mse_over(&points, |run| run.seconds)] {
+    for law in [mse_over(&points, |run| run.spp, 0.0), mse_over(&points, |run| run.seconds, 0.0)] {
         assert!((law.unwrap().slope.estimate + 1.0).abs() < 1e-12, "{law:?}");
     }
     assert_eq!(Point::new(vec![run(0, 64.0, 1.0, 0.1)]).spp_label(), "64");
@@ -153,7 +190,7 @@ fn pairs(random: &mut Random, mse_ratio: f64) -> Vec<Pair> {
 #[test]
 fn pairs_give_ratios_and_a_verdict() {
     let mut random = Random(7);
-    let mut ratios = |mse_ratio: f64| Comparison::of(&[pairs(&mut random, mse_ratio)]).overall;
+    let mut ratios = |mse_ratio: f64| Comparison::of(&[pairs(&mut random, mse_ratio)], 0.0).overall;
     let better = ratios(0.5);
     assert!(better.render_seconds.unwrap().contains(0.5) && better.mse.unwrap().contains(0.5), "{better:?}");
     assert!((better.process_seconds.unwrap().estimate - 0.5).abs() < 1e-12, "a drift cancels within a pair");
@@ -168,7 +205,7 @@ fn pairs_give_ratios_and_a_verdict() {
 fn the_overall_ratio_is_the_geometric_mean_over_rows() {
     let mut random = Random(10);
     let rows = [0.5, 2.0, -1.0].map(|ratio| pairs(&mut random, ratio));
-    let Comparison { rows, overall } = Comparison::of(&rows);
+    let Comparison { rows, overall } = Comparison::of(&rows, 0.0);
     assert!(rows[0].mse.unwrap().contains(0.5) && rows[1].mse.unwrap().contains(2.0), "{rows:?}");
     assert!(rows[2].mse.is_none() && rows[2].efficiency.is_none() && rows[2].render_seconds.is_some());
     let product = rows[0].mse.unwrap().estimate * rows[1].mse.unwrap().estimate;
@@ -194,7 +231,7 @@ fn the_interval_of_the_overall_ratio_covers_where_rows_share_their_samples() {
             };
             seeds.iter().enumerate().map(pair).collect()
         });
-        hits += u32::from(Comparison::of(&rows).overall.mse.unwrap().contains(1.0));
+        hits += u32::from(Comparison::of(&rows, 0.0).overall.mse.unwrap().contains(1.0));
     }
     assert_covers(hits);
 }
