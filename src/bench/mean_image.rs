@@ -89,6 +89,11 @@ impl ImageAccumulator {
         }
     }
 
+    /// Images taken in.
+    pub fn count(&self) -> usize {
+        self.count as usize
+    }
+
     /// The mean of at least two images.
     ///
     /// # Panics

@@ -19,22 +19,61 @@ const SIZE: (u32, u32) = (960, 640);
 const POINTS: RGBColor = RGBColor(0, 114, 178);
 const LINE: RGBColor = RGBColor(213, 94, 0);
 
-/// Draws a measurement to `PATH.svg` and `PATH.png`.
+/// A format that a plot can be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlotFormat {
+    /// Vectors.
+    Svg,
+    /// Pixels.
+    Png,
+}
+
+impl PlotFormat {
+    /// The format that a file name asks for.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the extension is neither `.svg` nor `.png`.
+    pub fn of(path: &Path) -> Result<Self> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            _ => Err(Error::Usage(format!(
+                "plot '{}': its extension names no format of a plot; use .svg or .png",
+                path.display()
+            ))),
+        }
+    }
+}
+
+/// Draws a measurement to a file in the format of its extension.
 ///
 /// # Errors
-/// [`Error::Input`] if a file cannot be written or nothing can be drawn: no MSE is above the reference's noise.
+/// [`Error::Usage`] if that is none; [`Error::Input`] if nothing can be drawn: no MSE is above the reference's noise;
+/// [`Error::Io`] if the file cannot be written.
 pub fn draw(measurement: &Measurement, title: &str, path: &Path) -> Result<()> {
     register_fonts();
-    let (svg, png) = (path.with_extension("svg"), path.with_extension("png"));
-    let mut text = String::new();
-    draw_on(&SVGBackend::with_string(&mut text, SIZE).into_drawing_area(), measurement, title)
-        .map_err(|message| Error::input(&svg, message))?;
-    write_atomically(&svg, |file| file.write_all(text.as_bytes()))?;
-    let mut bytes = vec![0; 3 * SIZE.0 as usize * SIZE.1 as usize];
-    draw_on(&BitMapBackend::with_buffer(&mut bytes, SIZE).into_drawing_area(), measurement, title)
-        .map_err(|message| Error::input(&png, message))?;
-    let pixels: Vec<[u8; 3]> = bytes.chunks_exact(3).map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect();
-    write_png(&png, SIZE.0, SIZE.1, &pixels)
+    let failed = |message: String| Error::input(path, message);
+    match PlotFormat::of(path)? {
+        PlotFormat::Svg => {
+            let mut text = String::new();
+            draw_on(&SVGBackend::with_string(&mut text, SIZE).into_drawing_area(), measurement, title)
+                .map_err(failed)?;
+            write_atomically(path, |file| file.write_all(text.as_bytes()))
+        }
+        PlotFormat::Png => {
+            let mut bytes = vec![0; 3 * SIZE.0 as usize * SIZE.1 as usize];
+            draw_on(&BitMapBackend::with_buffer(&mut bytes, SIZE).into_drawing_area(), measurement, title)
+                .map_err(failed)?;
+            let pixels: Vec<[u8; 3]> = bytes.chunks_exact(3).map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect();
+            write_png(path, SIZE.0, SIZE.1, &pixels)
+        }
+    }
+}
+
+/// Whether there is anything to draw.
+pub fn can_draw(measurement: &Measurement) -> bool {
+    !marks(measurement).is_empty()
 }
 
 /// The font is part of the binary, so that a machine without fonts draws the same.
@@ -53,7 +92,7 @@ struct Mark {
     mse: f64,
     low: Option<f64>,
     high: f64,
-    spp: u32,
+    spp: String,
 }
 
 fn marks(measurement: &Measurement) -> Vec<Mark> {
@@ -63,8 +102,9 @@ fn marks(measurement: &Measurement) -> Vec<Mark> {
             seconds: point.seconds.mean,
             mse: point.mse.mean,
             low: Some(point.mse.mean - point.mse.standard_error).filter(|low| *low > 0.0),
-            high: point.mse.mean + point.mse.standard_error,
-            spp: point.spp,
+            // One seed has no standard error; `max` passes over its NaN.
+            high: (point.mse.mean + point.mse.standard_error).max(point.mse.mean),
+            spp: point.spp_label(),
         })
         .collect()
 }

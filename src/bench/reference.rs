@@ -61,6 +61,13 @@ pub struct Errors {
     pub mean_difference: [f64; 3],
 }
 
+impl ReferenceInfo {
+    /// Standard error that all corrected MSEs share; 0 where it is not known.
+    pub fn common_error(&self) -> f64 {
+        self.mse_standard_error.unwrap_or(0.0)
+    }
+}
+
 impl Reference {
     /// The reference in an EXR file. Its `variance` channel is used if it has one.
     ///

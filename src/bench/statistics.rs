@@ -1,8 +1,5 @@
-//! Means with standard errors, ratios and slopes with intervals, all from independent repetitions (seeds) by Student's t.
-//!
-//! Every interval here is the t interval over one number a seed: the slope that seed's images have, the logarithm of
-//! the ratio that seed's pair has. That asks for independent seeds and nothing else; the scatter may differ from one
-//! sample count to the next, as it does.
+//! Means with standard errors and intervals from independent repetitions (seeds), by Student's t, and the
+//! distributions behind them. What is no mean is in [`super::jackknife`].
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -51,64 +48,11 @@ impl Interval {
         (self.low..=self.high).contains(&value)
     }
 
-    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+    /// The interval of a rising function of the value.
+    #[must_use]
+    pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
         Self { estimate: f(self.estimate), low: f(self.low), high: f(self.high) }
     }
-}
-
-/// The t interval of the mean. `None` below two values, or if one is not finite.
-pub fn mean_interval(values: &[f64]) -> Option<Interval> {
-    if values.len() < 2 || values.iter().any(|value| !value.is_finite()) {
-        return None;
-    }
-    let Summary { mean, standard_error } = Summary::of(values);
-    let half = t_quantile(0.5 + 0.5 * CONFIDENCE, values.len() as f64 - 1.0) * standard_error;
-    Some(Interval { estimate: mean, low: mean - half, high: mean + half })
-}
-
-/// The interval of a ratio from the logarithms of the ratios of independent pairs: their geometric mean.
-pub fn ratio_interval(log_ratios: &[f64]) -> Option<Interval> {
-    mean_interval(log_ratios).map(|interval| interval.map(f64::exp))
-}
-
-/// A power law y = e^`intercept` · x^`slope`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PowerLaw {
-    /// Exponent.
-    pub slope: Interval,
-    /// Logarithm of y at x = 1.
-    pub intercept: f64,
-}
-
-impl PowerLaw {
-    /// y at x.
-    pub fn at(&self, x: f64) -> f64 {
-        (self.intercept + self.slope.estimate * x.ln()).exp()
-    }
-}
-
-/// Fits a power law to the points (x, y) of every seed: one straight line a seed in the logarithms, by least squares.
-/// The law is the mean line, and its slope's interval the t interval over the seeds' slopes.
-///
-/// `None` if there is no such law: fewer than two seeds, a seed with fewer than two different x, or a number that has
-/// no logarithm (an error that is not above the noise of its reference).
-pub fn fit_power_law(seeds: &[Vec<(f64, f64)>]) -> Option<PowerLaw> {
-    let lines: Option<Vec<_>> = seeds.iter().map(|points| log_line(points)).collect();
-    let lines = lines?;
-    let slopes: Vec<f64> = lines.iter().map(|(slope, _)| *slope).collect();
-    let intercepts: Vec<f64> = lines.iter().map(|(_, intercept)| *intercept).collect();
-    Some(PowerLaw { slope: mean_interval(&slopes)?, intercept: Summary::of(&intercepts).mean })
-}
-
-/// Slope and intercept of the least-squares line through (ln x, ln y).
-fn log_line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
-    let n = points.len() as f64;
-    let logs: Vec<_> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    let (x_mean, y_mean) = logs.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / n, sum.1 + y / n));
-    let (xx, xy) =
-        logs.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + (x - x_mean).powi(2), sum.1 + (x - x_mean) * (y - y_mean)));
-    let (slope, intercept) = (xy / xx, y_mean - xy / xx * x_mean);
-    (slope.is_finite() && intercept.is_finite()).then_some((slope, intercept))
 }
 
 /// The value below which a share `p` of Student's t distribution lies; infinite degrees of freedom are the normal one.

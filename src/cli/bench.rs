@@ -2,19 +2,21 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
-use sunfleck::bench::measure::{Measurement, Plan, ReferenceChoice, measure};
-use sunfleck::bench::plot;
-use sunfleck::film::output::write_atomically;
+use sunfleck::bench::measure::{Measurement, measure};
+use sunfleck::bench::plan::{Budget, Plan, ReferenceChoice};
+use sunfleck::bench::plot::{self, PlotFormat};
+use sunfleck::film::output::{check_writable, write_atomically};
 use sunfleck::render::{OpenDevice, Settings, open_device};
 use sunfleck::scene::Scene;
 use sunfleck::{Error, Result};
 
 use super::bench_report::{heading, print_measurement};
 use super::estimator_args::EstimatorArgs;
+use super::given_flags::GivenFlags;
 use super::progress::Progress;
 use super::render::load_scene;
 use super::{bench_compare, bench_suite, interrupt, parse, print_json};
@@ -23,9 +25,13 @@ const EXAMPLES: &str = "\
 Errors are to the reference, in linear radiance: MSE, relMSE ((a - b)^2 / (b^2 + 0.01^2)) and FLIP. The reference's own
 noise is subtracted from MSE and relMSE, not from FLIP.
 
+Flags beside a SUITE hold for each of its benches and override what the suite says; those that name something of one
+scene (--camera, --reference, --plot, --compare) are refused there.
+
 Examples:
   sunfleck bench                                     the Cornell box
   sunfleck bench scene.gltf --spp 4..256 -o out      with DIR/scene.json, .svg and .png
+  sunfleck bench scene.gltf --times 0.25s..4s --plot error.svg
   sunfleck bench scene.gltf --reference truth.exr --strict
   sunfleck bench --compare '--light-sampling bsdf'   settings against each other
   sunfleck bench --compare ../old/sunfleck           builds against each other
@@ -35,26 +41,34 @@ Examples:
 #[derive(Args, Clone, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct BenchArgs {
+    #[command(flatten)]
+    pub(super) given: GivenFlags,
     /// A scene as `render` takes it; or a suite: a .json file, or the name of one in benches/suites.
     #[arg(value_name = "SCENE|SUITE", default_value = "cornell")]
     pub(super) scene: String,
     /// Write DIR/NAME.json, .svg and .png; of a suite also DIR/README.md.
     #[arg(short, long = "output", value_name = "DIR")]
     pub(super) output: Option<PathBuf>,
+    /// Draw error over time to this .svg or .png file. May be given several times.
+    #[arg(long, value_name = "FILE", conflicts_with = "compare")]
+    plot: Vec<PathBuf>,
 
     /// Samples per pixel, doubling from MIN to MAX.
-    #[arg(long, value_name = "MIN..MAX", default_value = "4..64", value_parser = parse::doubling, help_heading = "Bench")]
-    pub(super) spp: parse::Doubling,
-    /// Images at each count, each of another seed.
+    #[arg(long, value_name = "MIN..MAX", default_value = "4..64", value_parser = parse::doubling, conflicts_with = "times", help_heading = "Bench")]
+    spp: parse::Doubling<u32>,
+    /// Render times instead, doubling from MIN to MAX, as in 0.25s..4s.
+    #[arg(long, value_name = "MIN..MAX", value_parser = parse::doubling_times, help_heading = "Bench")]
+    times: Option<parse::Doubling<Duration>>,
+    /// Images of each count or time, each of another seed.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(2..=4096), help_heading = "Bench")]
     pub(super) seeds: u32,
     /// An EXR to measure against; its `variance` channel is used [default: an own run of another estimator].
     #[arg(long, value_name = "FILE", conflicts_with = "reference_spp", help_heading = "Bench")]
     pub(super) reference: Option<PathBuf>,
-    /// Samples per pixel of the own reference [default: 2 x seeds x MAX].
+    /// Samples per pixel of the own reference [default: 2 x seeds x MAX, of --spp or of --times].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 30), help_heading = "Bench")]
     reference_spp: Option<u32>,
-    /// Alternate with another sunfleck program, or with other flags of `render` (quoted), at MAX samples per pixel.
+    /// Alternate with another sunfleck program, or with other flags of `render` (quoted).
     #[arg(long, value_name = "BINARY|SETTINGS", allow_hyphen_values = true, help_heading = "Bench")]
     pub(super) compare: Option<String>,
 
@@ -83,6 +97,7 @@ pub(crate) fn run(args: BenchArgs) -> anyhow::Result<()> {
     if let Some(folder) = &args.output {
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "make this folder", e))?;
     }
+    args.check_plots()?;
     if let Some(suite) = bench_suite::find(&args.scene) {
         return bench_suite::run(&suite, &args);
     }
@@ -106,13 +121,16 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// Whether `--strict` lets it pass.
+    /// Whether it is complete, and whether `--strict` lets it pass.
     pub(super) fn verdict(&self, strict: bool) -> Result<()> {
-        let Measurement { bias, non_finite_samples, .. } = &self.measurement;
+        let Measurement { bias, non_finite_samples, interrupted, .. } = &self.measurement;
+        if *interrupted {
+            return Err(Error::Interrupted);
+        }
         if strict && *non_finite_samples > 0 {
             return Err(Error::Untrustworthy(format!("--strict: {non_finite_samples} samples were NaN or infinite")));
         }
-        if strict && bias.biased {
+        if let Some(bias) = bias.as_ref().filter(|bias| strict && bias.biased) {
             let failures = bias.failures;
             return Err(Error::Untrustworthy(format!("--strict: biased; {failures} of {} tests fail", bias.tests)));
         }
@@ -139,14 +157,16 @@ pub(super) fn bench(args: &BenchArgs, name: &str) -> anyhow::Result<Report> {
     value["scene"] = json!(args.scene);
     value["flags"] = json!(args.estimator.render_flags());
     value["seconds"]["start_up"] = json!(ready.start_up_seconds);
+    let mut plots = args.plot.clone();
     if let Some(folder) = &args.output {
         write_json(&folder.join(format!("{name}.json")), &value)?;
-        if measurement.points.iter().any(|point| point.mse.mean > 0.0) {
-            plot::draw(&measurement, &heading(args, name), &folder.join(format!("{name}.svg")))?;
+        if plot::can_draw(&measurement) {
+            plots.extend(["svg", "png"].map(|extension| folder.join(format!("{name}.{extension}"))));
         } else {
             eprintln!("warning: no plot of {name}: no MSE is above the reference's noise");
         }
     }
+    plots.iter().try_for_each(|path| plot::draw(&measurement, &heading(args, name), path))?;
     Ok(Report { value, measurement })
 }
 
@@ -180,15 +200,31 @@ impl Ready {
 }
 
 impl BenchArgs {
-    /// The largest count.
-    pub(super) fn max_spp(&self) -> u32 {
-        self.spp.0.last().copied().unwrap_or(1)
+    /// What the images of each row may take.
+    pub(super) fn rows(&self) -> Vec<Budget> {
+        match &self.times {
+            Some(times) => times.0.iter().copied().map(Budget::Time).collect(),
+            None => self.spp.0.iter().copied().map(Budget::Samples).collect(),
+        }
     }
 
     fn plan(&self) -> Plan {
-        let own = self.reference_spp.unwrap_or_else(|| self.max_spp().saturating_mul(2 * self.seeds));
+        let rows = self.rows();
+        // As much as all images together, since rows that double add up to twice the last one.
+        let own = self.reference_spp.map_or(rows[rows.len() - 1].times(2 * self.seeds), Budget::Samples);
         let reference = self.reference.clone().map_or(ReferenceChoice::Own(own), ReferenceChoice::File);
-        Plan { spp: self.spp.0.clone(), seeds: self.seeds, reference }
+        Plan { rows, seeds: self.seeds, reference }
+    }
+
+    /// Usage errors first, then what the file system says.
+    fn check_plots(&self) -> Result<()> {
+        for (n, path) in self.plot.iter().enumerate() {
+            PlotFormat::of(path)?;
+            if self.plot[..n].contains(path) {
+                return Err(Error::Usage(format!("plot '{}' is given twice", path.display())));
+            }
+        }
+        self.plot.iter().try_for_each(|path| check_writable(path))
     }
 }
 

@@ -9,15 +9,16 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use sunfleck::bench::bias::{BiasVerdict, find_bias};
 use sunfleck::bench::mean_image::ImageAccumulator;
-use sunfleck::bench::measure::{processor_name, reference_of};
-use sunfleck::bench::pairs::{Pair, Ratios, Sample, a_first};
+use sunfleck::bench::measure::{keep_common_seeds, processor_name, reference_of};
+use sunfleck::bench::pairs::{Comparison, Pair, Sample, a_first};
+use sunfleck::bench::plan::Budget;
 use sunfleck::bench::reference::Reference;
-use sunfleck::bench::statistics::Interval;
-use sunfleck::film::exr::read_exr;
+use sunfleck::bench::too_short;
+use sunfleck::film::exr::{ChannelValues, ExrImage, SAMPLES_CHANNEL, read_exr};
 use sunfleck::{Error, Result};
 
 use super::bench::{BenchArgs, Ready, scene_name, write_json};
-use super::bench_report::{bias, heading};
+use super::bench_compare_report::print;
 use super::progress::Progress;
 use super::{interrupt, print_json};
 
@@ -38,33 +39,54 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
     // A first image of each side warms the caches of files and drivers, finds wrong flags, and is not measured.
     for side in &mut sides {
-        side.render(args, args.estimator.seed, folder.path())?;
+        side.render(args, args.estimator.seed, ready.plan.rows[0], folder.path())?;
     }
     let reference = reference(args, &ready)?;
-    let mut pairs = Vec::new();
+    let mut rows: Vec<Vec<Pair>> = ready.plan.rows.iter().map(|_| Vec::new()).collect();
+    let interrupted = match render_pairs(args, &ready.plan.rows, &mut sides, folder.path(), &reference, &mut rows) {
+        Err(Error::Interrupted) => true,
+        result => result.map(|()| false)?,
+    };
+    keep_common_seeds(&mut rows);
+    if rows.first().is_none_or(|pairs| pairs.len() < 2) {
+        return Err(Error::Interrupted.into());
+    }
+    finish(args, &reference, sides, &rows, interrupted)
+}
+
+/// All rows of one seed after the other; in each of them A and B go first in turns.
+fn render_pairs(
+    args: &BenchArgs,
+    budgets: &[Budget],
+    sides: &mut [Side; 2],
+    folder: &Path,
+    reference: &Reference,
+    rows: &mut [Vec<Pair>],
+) -> Result<()> {
     for n in 0..args.seeds {
         let seed = args.estimator.seed.wrapping_add(n);
-        let [a, b] = &mut sides;
-        let sample = |side: &mut Side| side.sample(args, seed, folder.path(), &reference);
-        let (a, b) = if a_first(n as usize) {
-            let a = sample(a)?;
-            (a, sample(b)?)
-        } else {
-            let b = sample(b)?;
-            (sample(a)?, b)
-        };
-        pairs.push(Pair { seed, a, b });
-        if !args.quiet {
-            eprintln!(
-                "pair {} of {}: render {:.3} s and {:.3} s",
-                n + 1,
-                args.seeds,
-                a.render_seconds,
-                b.render_seconds
-            );
+        for (row, &budget) in budgets.iter().enumerate() {
+            let last = row + 1 == budgets.len();
+            let [a, b] = &mut *sides;
+            let sample = |side: &mut Side| side.sample(args, seed, budget, folder, reference, last);
+            let (a, b) = if a_first(n as usize + row) {
+                let a = sample(a)?;
+                (a, sample(b)?)
+            } else {
+                let b = sample(b)?;
+                (sample(a)?, b)
+            };
+            rows[row].push(Pair { seed, a, b });
+            if !args.quiet {
+                let (n, seeds) = (n + 1, args.seeds);
+                eprintln!(
+                    "{budget}, pair {n} of {seeds}: render {:.3} s and {:.3} s",
+                    a.render_seconds, b.render_seconds
+                );
+            }
         }
     }
-    finish(args, &reference, sides, &pairs)
+    Ok(())
 }
 
 fn reference(args: &BenchArgs, ready: &Ready) -> Result<Reference> {
@@ -112,13 +134,17 @@ fn overridden(flags: &[String], changes: Vec<String>) -> Vec<String> {
 
 impl Side {
     /// Renders one image; returns its file and the seconds of the process.
-    fn render(&mut self, args: &BenchArgs, seed: u32, folder: &Path) -> Result<(PathBuf, f64)> {
+    fn render(&mut self, args: &BenchArgs, seed: u32, budget: Budget, folder: &Path) -> Result<(PathBuf, f64)> {
         let image = folder.join(format!("{}.exr", self.label));
         let (width, height) = args.resolution;
         let mut command = Command::new(&self.program);
         command.args(["render", &args.scene, "--json", "--quiet", "-o"]).arg(&image);
         command.arg(format!("--resolution={width}x{height}"));
-        command.args([format!("--spp={}", args.max_spp()), format!("--seed={seed}")]);
+        let limit = match budget {
+            Budget::Samples(spp) => format!("--spp={spp}"),
+            Budget::Time(time) => format!("--time={}s", time.as_secs_f64()),
+        };
+        command.args([limit, format!("--seed={seed}")]);
         command.args(args.camera.iter().map(|camera| format!("--camera={camera}"))).args(&self.flags);
         let start = Instant::now();
         let output = command.stdin(Stdio::null()).output();
@@ -148,23 +174,52 @@ impl Side {
         }
     }
 
-    fn sample(&mut self, args: &BenchArgs, seed: u32, folder: &Path, reference: &Reference) -> Result<Sample> {
-        let (path, process_seconds) = self.render(args, seed, folder)?;
+    /// Renders one image and measures it; takes it into the mean if it is of the last row.
+    fn sample(
+        &mut self,
+        args: &BenchArgs,
+        seed: u32,
+        budget: Budget,
+        folder: &Path,
+        reference: &Reference,
+        last: bool,
+    ) -> Result<Sample> {
+        let (path, process_seconds) = self.render(args, seed, budget, folder)?;
         let image = read_exr(&path)?;
         let radiance = image.rgb().ok_or_else(|| Error::input(&path, "has no channels R, G, B"))?;
         if (image.width, image.height) != args.resolution {
             return Err(Error::Usage(format!("side {} renders {}x{}", self.label, image.width, image.height)));
         }
-        self.mean.add(&radiance);
-        let render_seconds = self.report["seconds"]["render"].as_f64().ok_or_else(|| {
-            Error::input(&self.program, format!("side {}: its report lacks seconds.render", self.label))
-        })?;
-        Ok(Sample { render_seconds, process_seconds, mse: reference.errors_of(&radiance).mse })
+        if has_pixel_without_sample(&image) {
+            return Err(too_short(budget));
+        }
+        if last {
+            self.mean.add(&radiance);
+        }
+        let (spp, render_seconds) = (self.number("/spp")?, self.number("/seconds/render")?);
+        Ok(Sample { spp, render_seconds, process_seconds, mse: reference.errors_of(&radiance).mse })
+    }
+
+    /// A number of the last report.
+    fn number(&self, pointer: &str) -> Result<f64> {
+        self.report.pointer(pointer).and_then(Value::as_f64).ok_or_else(|| {
+            Error::input(&self.program, format!("side {}: its report lacks the number {pointer}", self.label))
+        })
     }
 }
 
-fn finish(args: &BenchArgs, reference: &Reference, sides: [Side; 2], pairs: &[Pair]) -> anyhow::Result<()> {
-    let ratios = Ratios::of(pairs);
+fn has_pixel_without_sample(image: &ExrImage) -> bool {
+    matches!(image.values(SAMPLES_CHANNEL), Some(ChannelValues::U32(counts)) if counts.contains(&0))
+}
+
+fn finish(
+    args: &BenchArgs,
+    reference: &Reference,
+    sides: [Side; 2],
+    rows: &[Vec<Pair>],
+    interrupted: bool,
+) -> anyhow::Result<()> {
+    let comparison = Comparison::of(rows, reference.about.common_error());
     let described: Vec<(Value, BiasVerdict)> = sides
         .into_iter()
         .map(|side| {
@@ -181,20 +236,26 @@ fn finish(args: &BenchArgs, reference: &Reference, sides: [Side; 2], pairs: &[Pa
         })
         .collect();
     let [(a, a_bias), (b, b_bias)] = [&described[0], &described[1]];
+    let of_rows = args
+        .rows()
+        .into_iter()
+        .zip(rows)
+        .zip(&comparison.rows)
+        .map(|((budget, pairs), ratios)| json!({ "budget": budget.to_string(), "pairs": pairs, "ratios": ratios }));
     let value = json!({
         "scene": args.scene,
         "resolution": [args.resolution.0, args.resolution.1],
-        "spp": args.max_spp(),
         "processor": processor_name(),
         "reference": reference.about,
+        "interrupted": interrupted,
         "a": a,
         "b": b,
-        "pairs": pairs,
-        "ratios": ratios,
-        "verdict": ratios.verdict(),
+        "rows": of_rows.collect::<Vec<_>>(),
+        "ratios": comparison.overall,
+        "verdict": comparison.overall.verdict(),
     });
     if !args.quiet {
-        print(args, &value, &ratios, [a_bias, b_bias]);
+        print(args, &value, &comparison, [a_bias, b_bias]);
     }
     if let Some(folder) = &args.output {
         write_json(&folder.join(format!("{}-compare.json", scene_name(&args.scene))), &value)?;
@@ -202,36 +263,11 @@ fn finish(args: &BenchArgs, reference: &Reference, sides: [Side; 2], pairs: &[Pa
     if args.json {
         print_json(&value)?;
     }
+    if interrupted {
+        return Err(Error::Interrupted.into());
+    }
     if args.strict && (a_bias.biased || b_bias.biased) {
         return Err(Error::Untrustworthy("--strict: a side is biased".to_owned()).into());
     }
     Ok(())
-}
-
-fn print(args: &BenchArgs, value: &Value, ratios: &Ratios, biases: [&BiasVerdict; 2]) {
-    let text = |value: &Value| value.as_str().unwrap_or("not known").to_owned();
-    eprintln!("{}, {} spp, {} pairs", heading(args, &scene_name(&args.scene)), args.max_spp(), args.seeds);
-    eprintln!("  processor  {}", text(&value["processor"]));
-    eprintln!("  reference  {}", text(&value["reference"]["description"]));
-    for (side, verdict) in ["a", "b"].into_iter().zip(biases) {
-        let flags: Vec<_> = value[side]["flags"].as_array().into_iter().flatten().map(text).collect();
-        eprintln!("  {}          {} {}", side.to_uppercase(), text(&value[side]["program"]), flags.join(" "));
-        eprintln!("             {}, {}", text(&value[side]["device"]), text(&value[side]["driver"]));
-        eprintln!("             kernel {}", text(&value[side]["kernel_key"]));
-        eprintln!("             {}", bias(verdict));
-    }
-    eprintln!("\n  B over A, 95 % interval");
-    for (name, ratio) in [
-        ("render time", ratios.render_seconds),
-        ("process time", ratios.process_seconds),
-        ("MSE", ratios.mse),
-        ("efficiency", ratios.efficiency),
-    ] {
-        eprintln!("  {name:<13} {}", ratio.map_or("not known".to_owned(), interval));
-    }
-    eprintln!("  {}", ratios.verdict());
-}
-
-fn interval(ratio: Interval) -> String {
-    format!("{:.4}  ({:.4} to {:.4})", ratio.estimate, ratio.low, ratio.high)
 }

@@ -3,8 +3,10 @@
 use std::fmt::Write;
 
 use sunfleck::bench::bias::BiasVerdict;
-use sunfleck::bench::measure::{Measurement, Point};
-use sunfleck::bench::statistics::{PowerLaw, Summary};
+use sunfleck::bench::measure::Measurement;
+use sunfleck::bench::point::Point;
+use sunfleck::bench::power_law::PowerLaw;
+use sunfleck::bench::statistics::Summary;
 
 use super::bench::BenchArgs;
 use super::progress::time;
@@ -45,37 +47,78 @@ pub(super) fn text(heading: &str, m: &Measurement, start_up_seconds: f64) -> Str
     for point in &m.points {
         let _ = writeln!(out, "{}", row(point));
     }
+    if m.points.iter().any(is_at_noise) {
+        let _ = writeln!(out, "  * the mean MSE is not safely above the reference's noise: left out of the slopes");
+    }
+    if m.interrupted {
+        let seeds = m.points.first().map_or(0, |point| point.runs.len());
+        let _ = writeln!(out, "  interrupted: of {seeds} seed{}", if seeds == 1 { "" } else { "s" });
+    }
     let _ = writeln!(out);
     let _ = writeln!(out, "  MSE over spp   {}", slope(m.mse_over_spp.as_ref()));
     let _ = writeln!(out, "  MSE over time  {}", slope(m.mse_over_seconds.as_ref()));
-    let _ = writeln!(out, "  bias           {}", bias(&m.bias));
+    let _ = writeln!(out, "  bias           {}", bias(m.bias.as_ref()));
+    if reference_is_short(m) {
+        let _ = writeln!(
+            out,
+            "note: the reference has fewer samples than the last row's images together: rare paths that it lacks look like bias"
+        );
+    }
     if m.non_finite_samples > 0 {
         let _ = writeln!(out, "warning: {} samples were NaN or infinite; each is a bug", m.non_finite_samples);
     }
     out
 }
 
+/// The bias test takes means as normal, and the mean of fewer samples is further from that.
+fn reference_is_short(m: &Measurement) -> bool {
+    m.points.last().is_some_and(|last| m.reference.spp.is_some_and(|spp| spp < last.spp * last.runs.len() as f64))
+}
+
 fn header() -> String {
-    format!("{:>7} {:>18} {:>23} {:>23} {:>19} {:>11}", "spp", "seconds", "MSE", "relMSE", "FLIP", "1/(MSE s)")
+    format!("{:>8} {:>18} {:>23} {:>23} {:>19} {:>21}", "spp", "seconds", "MSE", "relMSE", "FLIP", "1/(MSE s)")
 }
 
 fn row(point: &Point) -> String {
-    let plain = |s: &Summary| format!("{:.4} ± {:.4}", s.mean, s.standard_error);
-    let scientific = |s: &Summary| format!("{:.3e} ± {:.1e}", s.mean, s.standard_error);
     format!(
-        "{:>7} {:>18} {:>23} {:>23} {:>19} {:>11.4e}",
-        point.spp,
+        "{:>8} {:>18} {:>23} {:>23} {:>19} {:>21}{}",
+        point.spp_label(),
         plain(&point.seconds),
         scientific(&point.mse),
         scientific(&point.rel_mse),
         point.flip.as_ref().map_or("too large".to_owned(), plain),
-        point.efficiency
+        efficiency(point),
+        if is_at_noise(point) { " *" } else { "" },
     )
+}
+
+/// A single seed does not tell.
+fn is_at_noise(point: &Point) -> bool {
+    !point.in_fit && point.runs.len() > 1
+}
+
+fn plain(summary: &Summary) -> String {
+    with_error(summary, |value| format!("{value:.4}"), |error| format!("{error:.4}"))
+}
+
+fn scientific(summary: &Summary) -> String {
+    with_error(summary, |value| format!("{value:.3e}"), |error| format!("{error:.1e}"))
+}
+
+/// A single seed has no standard error.
+fn with_error(summary: &Summary, value: fn(f64) -> String, error: fn(f64) -> String) -> String {
+    let value = value(summary.mean);
+    if summary.standard_error.is_nan() { value } else { format!("{value} ± {}", error(summary.standard_error)) }
+}
+
+/// Efficiency with its standard error, if there is one.
+pub(super) fn efficiency(point: &Point) -> String {
+    point.efficiency.map_or("–".to_owned(), |e| format!("{:.3e} ± {:.1e}", e.estimate, e.standard_error))
 }
 
 fn slope(law: Option<&PowerLaw>) -> String {
     law.map_or(
-        "no power law: an MSE is not above the reference's noise, or there is one count only".to_owned(),
+        "no power law: fewer than two rows, or two seeds, with an MSE above the reference's noise".to_owned(),
         |law| {
             let slope = law.slope;
             format!("slope {:.4}, 95 % interval {:.4} to {:.4}", slope.estimate, slope.low, slope.high)
@@ -84,7 +127,8 @@ fn slope(law: Option<&PowerLaw>) -> String {
 }
 
 /// The verdict in words.
-pub(super) fn bias(bias: &BiasVerdict) -> String {
+pub(super) fn bias(bias: Option<&BiasVerdict>) -> String {
+    let Some(bias) = bias else { return "not known: that takes two seeds".to_owned() };
     let skipped = match bias.skipped_pixels {
         0 => String::new(),
         count => format!("; {count} pixels that are not finite are left out"),

@@ -3,11 +3,13 @@
 
 mod bench;
 mod bench_compare;
+mod bench_compare_report;
 mod bench_report;
 mod bench_suite;
 mod compare;
 mod devices;
 mod estimator_args;
+mod given_flags;
 mod info;
 mod interrupt;
 mod merge;

@@ -4,6 +4,7 @@
 use sunfleck::render::{DeviceChoice, PixelFilter, SamplerKind};
 
 use super::Command;
+use super::bench::BenchArgs;
 use super::estimator_args::EstimatorArgs;
 use super::render_args::RenderArgs;
 
@@ -44,6 +45,11 @@ pub(crate) fn refuse(command: &Command) -> sunfleck::Result<()> {
     let verb = if asked.len() == 1 { "is" } else { "are" };
     let version = env!("CARGO_PKG_VERSION");
     Err(sunfleck::Error::Usage(format!("{} {verb} not built yet in sunfleck {version}", asked.join(", "))))
+}
+
+/// The same for a bench of a suite.
+pub(crate) fn refuse_for_bench(args: &BenchArgs) -> sunfleck::Result<()> {
+    refuse(&Command::Bench(Box::new(args.clone())))
 }
 
 /// Says so in `--help` too, so that nobody has to try.

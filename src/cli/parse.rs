@@ -82,7 +82,7 @@ pub(crate) fn exposure_ev(text: &str) -> Result<f32, String> {
 }
 
 /// `MIN..MAX`, sample counts that double from MIN while they are not above MAX.
-pub(crate) fn doubling(text: &str) -> Result<Doubling, String> {
+pub(crate) fn doubling(text: &str) -> Result<Doubling<u32>, String> {
     let ends = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
     let (min, max): (u32, u32) = ends.ok_or("expected MIN..MAX, sample counts that double, as in 4..64")?;
     if min == 0 || min > max {
@@ -91,6 +91,34 @@ pub(crate) fn doubling(text: &str) -> Result<Doubling, String> {
     Ok(Doubling(std::iter::successors(Some(min), |spp| spp.checked_mul(2)).take_while(|spp| *spp <= max).collect()))
 }
 
-/// Sample counts, ascending; at least one.
+/// `MIN..MAX`, times that double from MIN while they are not above MAX.
+pub(crate) fn doubling_times(text: &str) -> Result<Doubling<Duration>, String> {
+    let (min, max) = text.split_once("..").ok_or("expected MIN..MAX, times that double, as in 0.25s..4s")?;
+    let (min, max) = (duration(min)?, duration(max)?);
+    if min > max {
+        return Err("expected MIN..MAX with MIN not above MAX".to_owned());
+    }
+    Ok(Doubling(std::iter::successors(Some(min), |time| time.checked_mul(2)).take_while(|time| *time <= max).collect()))
+}
+
+/// Values that double, ascending; at least one.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Doubling(pub(crate) Vec<u32>);
+pub(crate) struct Doubling<T>(pub(crate) Vec<T>);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_double_up_to_their_end() {
+        assert_eq!(doubling("4..40"), Ok(Doubling(vec![4, 8, 16, 32])));
+        let milliseconds = |times: &[u64]| Ok(Doubling(times.iter().map(|&t| Duration::from_millis(t)).collect()));
+        assert_eq!(doubling_times("0.25s..1s"), milliseconds(&[250, 500, 1000]));
+        assert_eq!(doubling_times("250ms..0.3"), milliseconds(&[250]));
+        for (text, word) in [("1s", "MIN..MAX"), ("2s..1s", "not above"), ("0s..1s", "above 0"), ("1x..2s", "unit 'x'")]
+        {
+            let error = doubling_times(text).unwrap_err();
+            assert!(error.contains(word), "{text}: {error}");
+        }
+    }
+}

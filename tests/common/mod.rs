@@ -9,6 +9,7 @@ pub mod ggx_albedo;
 pub mod gpu;
 pub mod kernel;
 pub mod mutation;
+pub mod random;
 pub mod reference;
 pub mod scenes;
 pub mod statistics;

@@ -1,45 +1,36 @@
-//! The statistics of `sunfleck bench` on synthetic data with a known answer.
+//! The errors, intervals and the bias test of `sunfleck bench` on synthetic images with a known answer.
 
 use sunfleck::bench::bias::{ALPHA, find_bias};
+use sunfleck::bench::jackknife::{jackknife, mean_without};
 use sunfleck::bench::mean_image::{ImageAccumulator, MeanImage};
-use sunfleck::bench::pairs::{Pair, Ratios, Sample, a_first};
+use sunfleck::bench::own_reference::other_estimator;
 use sunfleck::bench::reference::Reference;
-use sunfleck::bench::statistics::{fit_power_law, mean_interval, sidak, t_quantile};
+use sunfleck::bench::statistics::{Interval, sidak, t_quantile};
+use sunfleck::gpu::{DeviceKind, TraceBackend};
+use sunfleck::render::{LightSampling, Settings, TraceChoice};
 
-/// SplitMix64 (Steele, Lea and Flood 2014): the tests' own random numbers, the same every time.
-struct Random(u64);
+use crate::common::random::Random;
 
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+/// An image of this mean whose pixels are means of `spp` exponential samples: skewed, as radiance is.
+fn image(random: &mut Random, side: u32, spp: u32, mean: impl Fn(u32, u32) -> f64) -> Vec<[f32; 3]> {
+    let mut pixel = |mean: f64| {
+        let sum: f64 = (0..spp).map(|_| random.exponential()).sum();
+        (mean * sum / f64::from(spp)) as f32
+    };
+    (0..side * side).map(|i| [0; 3].map(|_: i32| pixel(mean(i % side, i / side)))).collect()
+}
+
+fn mean_image(random: &mut Random, side: u32, images: u32, spp: u32, mean: impl Fn(u32, u32) -> f64) -> MeanImage {
+    let mut accumulator = ImageAccumulator::new((side, side));
+    for _ in 0..images {
+        accumulator.add(&image(random, side, spp, &mean));
     }
+    accumulator.finish()
+}
 
-    /// Standard normal, by Box and Muller.
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-
-    /// An image of this mean whose pixels are means of `spp` exponential samples: skewed, as radiance is.
-    fn image(&mut self, side: u32, spp: u32, mean: impl Fn(u32, u32) -> f64) -> Vec<[f32; 3]> {
-        let mut pixel = |mean: f64| {
-            let sum: f64 = (0..spp).map(|_| -(1.0 - self.uniform()).ln()).sum();
-            (mean * sum / f64::from(spp)) as f32
-        };
-        (0..side * side).map(|i| [0; 3].map(|_: i32| pixel(mean(i % side, i / side)))).collect()
-    }
-
-    fn mean_image(&mut self, side: u32, images: u32, spp: u32, mean: impl Fn(u32, u32) -> f64) -> MeanImage {
-        let mut accumulator = ImageAccumulator::new((side, side));
-        for _ in 0..images {
-            accumulator.add(&self.image(side, spp, &mean));
-        }
-        accumulator.finish()
-    }
+/// The t interval of a mean.
+fn mean_interval(values: &[f64]) -> Interval {
+    jackknife(values.len(), |left_out| mean_without(values, left_out)).unwrap().interval()
 }
 
 #[test]
@@ -67,7 +58,7 @@ fn an_interval_holds_the_truth_as_often_as_it_says() {
     let mut random = Random(1);
     let hits = (0..4000).filter(|_| {
         let values: Vec<f64> = (0..8).map(|_| 3.0 + 2.0 * random.normal()).collect();
-        mean_interval(&values).unwrap().contains(3.0)
+        mean_interval(&values).contains(3.0)
     });
     // Binomial with n 4000 and p 0.95: its standard deviation is 13.8, the bound four of them.
     let hits = hits.count();
@@ -75,31 +66,11 @@ fn an_interval_holds_the_truth_as_often_as_it_says() {
 }
 
 #[test]
-fn the_slope_is_recovered_and_its_interval_covers() {
-    let mut random = Random(2);
-    let mut hits = 0;
-    for _ in 0..1000 {
-        let seeds: Vec<Vec<(f64, f64)>> = (0..8)
-            .map(|_| [4.0, 8.0, 16.0, 32.0].map(|x: f64| (x, 5.0 / x * (0.1 * random.normal()).exp())).to_vec())
-            .collect();
-        let law = fit_power_law(&seeds).unwrap();
-        assert!((law.slope.estimate + 1.0).abs() < 0.15, "{law:?}");
-        hits += u32::from(law.slope.contains(-1.0));
-    }
-    // Binomial with n 1000 and p 0.95: its standard deviation is 6.9, the bound four of them.
-    assert!((922..=978).contains(&hits), "{hits} of 1000");
-    let exact = fit_power_law(&vec![vec![(1.0, 2.0), (4.0, 1.0)]; 2]).unwrap();
-    assert!((exact.slope.estimate + 0.5).abs() < 1e-12 && (exact.at(16.0) - 0.5).abs() < 1e-12);
-    assert!(fit_power_law(&vec![vec![(1.0, 2.0), (4.0, -1.0)]; 2]).is_none(), "no logarithm, no law");
-    assert!(fit_power_law(&vec![vec![(1.0, 2.0)]; 2]).is_none(), "one count has no slope");
-}
-
-#[test]
 fn no_bias_is_found_where_there_is_none() {
     let mut random = Random(3);
     let found = (0..100).filter(|_| {
-        let image = random.mean_image(24, 8, 64, |_, _| 0.5);
-        let reference = random.mean_image(24, 8, 128, |_, _| 0.5);
+        let image = mean_image(&mut random, 24, 8, 64, |_, _| 0.5);
+        let reference = mean_image(&mut random, 24, 8, 128, |_, _| 0.5);
         find_bias(&image, &reference).biased
     });
     // At the level 0.01 more than 5 of 100 happen with probability 5e-4.
@@ -110,11 +81,11 @@ fn no_bias_is_found_where_there_is_none() {
 #[test]
 fn a_bias_in_one_tile_is_found_there() {
     let mut random = Random(4);
-    let reference = random.mean_image(24, 8, 128, |_, _| 0.5);
+    let reference = mean_image(&mut random, 24, 8, 128, |_, _| 0.5);
     let in_tile = |x, y| if (8..16).contains(&x) && y >= 16 { 0.54 } else { 0.5 };
-    let verdict = find_bias(&random.mean_image(24, 8, 64, in_tile), &reference);
+    let verdict = find_bias(&mean_image(&mut random, 24, 8, 64, in_tile), &reference);
     assert!(verdict.biased && verdict.worst.tile == Some([8, 16]), "{verdict:?}");
-    let same = find_bias(&random.mean_image(24, 8, 64, |_, _| 0.5), &reference);
+    let same = find_bias(&mean_image(&mut random, 24, 8, 64, |_, _| 0.5), &reference);
     assert!(!same.biased && same.tests == 3 * 10, "{same:?}");
 }
 
@@ -123,9 +94,9 @@ fn what_would_have_been_seen_is_seen() {
     let mut random = Random(5);
     let mut seen = 0;
     for _ in 0..40 {
-        let reference = random.mean_image(24, 8, 128, |_, _| 0.5);
-        let share = find_bias(&random.mean_image(24, 8, 64, |_, _| 0.5), &reference).detectable_image;
-        let biased = random.mean_image(24, 8, 64, |_, _| 0.5 * (1.0 + share));
+        let reference = mean_image(&mut random, 24, 8, 128, |_, _| 0.5);
+        let share = find_bias(&mean_image(&mut random, 24, 8, 64, |_, _| 0.5), &reference).detectable_image;
+        let biased = mean_image(&mut random, 24, 8, 64, |_, _| 0.5 * (1.0 + share));
         seen += u32::from(find_bias(&biased, &reference).biased);
     }
     // Any of the three channels shows it, so the chance is above POWER = 0.95; less than 33 of 40 has probability 1e-4.
@@ -146,46 +117,44 @@ fn equal_constants_are_no_bias_and_different_ones_are() {
 }
 
 #[test]
+fn the_own_reference_differs_where_it_can() {
+    let other = |settings: &Settings, trace, kind, ray_query| {
+        let other = other_estimator(settings, trace, kind, ray_query);
+        assert_eq!((other.max_bounces, other.shaders_dir), (settings.max_bounces, None));
+        (other.light_sampling, other.trace)
+    };
+    let settings = Settings { max_bounces: Some(3), shaders_dir: Some("mine".into()), ..Settings::default() };
+    let (bvh, query) = (TraceBackend::Bvh, TraceBackend::RayQuery);
+    for (trace, kind, ray_query, expected) in [
+        (bvh, DeviceKind::Discrete, false, TraceChoice::Bvh),
+        (bvh, DeviceKind::Discrete, true, TraceChoice::RayQuery),
+        (query, DeviceKind::Discrete, true, TraceChoice::Bvh),
+        (bvh, DeviceKind::Cpu, true, TraceChoice::Bvh),
+        (query, DeviceKind::Cpu, true, TraceChoice::Bvh),
+    ] {
+        assert_eq!(other(&settings, trace, kind, ray_query), (LightSampling::Mixture, expected));
+    }
+    for light_sampling in LightSampling::ALL.iter().copied().filter(|mode| *mode != LightSampling::Mis) {
+        let settings = Settings { light_sampling, ..Settings::default() };
+        assert_eq!(other(&settings, bvh, DeviceKind::Cpu, false).0, LightSampling::Mis);
+    }
+}
+
+#[test]
 fn the_noise_of_the_reference_is_subtracted() {
     let mut random = Random(6);
     let (side, runs) = (32, 40);
     let mut corrected = Vec::new();
     for _ in 0..runs {
         // Variance of a pixel: 0.25 / 32 of the image, 0.25 / (8 · 8) of the reference.
-        let reference = random.mean_image(side, 8, 8, |_, _| 0.5);
+        let reference = mean_image(&mut random, side, 8, 8, |_, _| 0.5);
         let reference = Reference::from_images(reference, String::new(), 64.0, 1.0);
-        corrected.push(reference.errors_of(&random.image(side, 32, |_, _| 0.5)).mse);
+        corrected.push(reference.errors_of(&image(&mut random, side, 32, |_, _| 0.5)).mse);
     }
     let (truth, biased) = (0.25 / 32.0, 0.25 / 32.0 + 0.25 / 64.0);
-    let interval = mean_interval(&corrected).unwrap();
+    let interval = mean_interval(&corrected);
     // The interval at 95 %, widened to four standard errors: 4 / 2.02 (t with 39 degrees of freedom).
     let half = (interval.high - interval.estimate) * 4.0 / 2.02;
     assert!((interval.estimate - truth).abs() < half, "{interval:?}, {truth}");
     assert!((interval.estimate - biased).abs() > half, "the test could not tell: {interval:?}, {biased}");
-}
-
-#[test]
-fn pairs_give_ratios_and_a_verdict() {
-    let mut random = Random(7);
-    let mut pairs = |mse_ratio: f64| -> Vec<Pair> {
-        (0..8)
-            .map(|n| {
-                let drift = 1.0 + 0.2 * f64::from(n);
-                let mut sample = |seconds: f64, mse: f64| Sample {
-                    render_seconds: seconds * drift * (0.02 * random.normal()).exp(),
-                    process_seconds: seconds * drift,
-                    mse: mse * (0.02 * random.normal()).exp(),
-                };
-                Pair { seed: n as u32, a: sample(2.0, 0.1), b: sample(1.0, 0.1 * mse_ratio) }
-            })
-            .collect()
-    };
-    let better = Ratios::of(&pairs(0.5));
-    assert!(better.render_seconds.unwrap().contains(0.5) && better.mse.unwrap().contains(0.5), "{better:?}");
-    assert!((better.process_seconds.unwrap().estimate - 0.5).abs() < 1e-12, "a drift cancels within a pair");
-    assert!(better.verdict().starts_with("B is better"), "{}", better.verdict());
-    assert!(Ratios::of(&pairs(8.0)).verdict().starts_with("A is better"));
-    assert!(Ratios::of(&pairs(2.0)).verdict().starts_with("no difference seen"));
-    assert!(Ratios::of(&pairs(-1.0)).verdict().starts_with("no verdict"));
-    assert_eq!([0, 1, 2, 3].map(a_first), [true, false, true, false]);
 }

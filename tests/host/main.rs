@@ -4,6 +4,7 @@
 mod common;
 
 mod bench;
+mod bench_rows;
 mod film_images;
 mod film_metrics;
 mod film_sums;

@@ -41,8 +41,8 @@ fn check_hits(triangles: &[TriangleVertices], rays: usize, seed: u64) -> f64 {
     let mut total_visits = 0;
     let mut hits = 0;
     for _ in 0..rays {
-        let origin = bounds.center() + random.vector() * bounds.half_extent() * 2.0;
-        let target = triangles[(random.next() % triangles.len() as u64) as usize];
+        let origin = bounds.center() + random.point(1.0) * bounds.half_extent() * 2.0;
+        let target = triangles[random.below(triangles.len())];
         let [a, b, c] = target.map(|v| Vec3::from(v).as_dvec3());
         let (mut u, mut v) = (random.unit(), random.unit());
         if u + v > 1.0 {
@@ -110,9 +110,9 @@ fn slivers_and_axis_aligned_planes() {
     let mut random = Random(5);
     let mut triangles: Vec<TriangleVertices> = (0..400)
         .map(|_| {
-            let a = random.vector();
+            let a = random.point(1.0);
             let b = a + random.direction() * 10.0;
-            [a, b, b + random.vector() * 1e-4].map(|v| v.as_vec3().into())
+            [a, b, b + random.point(1.0) * 1e-4].map(|v| v.as_vec3().into())
         })
         .collect();
     for axis in 0..3 {
@@ -165,10 +165,10 @@ fn quantised_boxes_contain_and_are_tight() {
     let mut random = Random(11);
     for _ in 0..20_000 {
         // Corners at all distances from zero and from each other.
-        let at = random.vector() * 10f64.powf(random.signed() * 12.0);
-        let size = 10f64.powf(random.signed() * 12.0);
-        let children: Vec<Bounds> = (0..1 + random.next() % 4)
-            .map(|_| Bounds::around([0, 1].map(|_| (at + random.vector() * size).as_vec3().into())))
+        let at = random.point(1.0) * 10f64.powf(random.between(-1.0, 1.0) * 12.0);
+        let size = 10f64.powf(random.between(-1.0, 1.0) * 12.0);
+        let children: Vec<Bounds> = (0..1 + random.below(4))
+            .map(|_| Bounds::around([0, 1].map(|_| (at + random.point(1.0) * size).as_vec3().into())))
             .collect();
         let slot = inner_slot(&children, 3);
         for (index, child) in children.iter().enumerate() {
@@ -228,7 +228,7 @@ fn instances_are_hit_as_baked_triangles() {
     let (kept_slots, baked_slots) = (slots(&kept), slots(&baked));
     let mut hits = 0;
     for _ in 0..2000 {
-        let ray = (random.vector() * 10.0, random.direction());
+        let ray = (random.point(1.0) * 10.0, random.direction());
         let a = traverse(&kept_slots, 0, &records, ray).0;
         let b = traverse(&baked_slots, 0, &[], ray).0;
         // Grazing rays may differ in the last place of f32; a hit apart from an edge may not.
@@ -274,7 +274,7 @@ fn instance_boxes_allow_for_the_rounding_of_rays() {
     let mut found = 0;
     for _ in 0..4000 {
         let target = transforms[0].transform_point3(DVec3::Y * random.unit()) - prepared.origin;
-        let away = DVec3::new(0.5 + random.unit(), random.signed(), -0.5 - random.unit()) * 1000.0;
+        let away = DVec3::new(0.5 + random.unit(), random.between(-1.0, 1.0), -0.5 - random.unit()) * 1000.0;
         let origin = (target + if random.unit() < 0.5 { away } else { -away }).as_vec3().as_dvec3();
         let ray = (origin, (target - origin).normalize().as_vec3().as_dvec3());
         let expected = closest_in_instances(&prepared, ray);

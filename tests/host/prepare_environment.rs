@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use crate::prepare_support::Random;
+use crate::common::random::Random;
 use glam::DVec3;
 use sunfleck::layout::CDF_TOTAL;
 use sunfleck::prepare::EnvironmentSampling::{Importance, Uniform};

@@ -87,11 +87,28 @@ fn a_mirrored_mesh_keeps_its_front_and_its_normals() {
     assert_eq!(geometric_normal(&leaves(&kept, 1)[0]), DVec3::Z);
 }
 
+/// The angle by which rounding its vertices to f32 can tilt the unit triangle under a transform: displacements of d turn
+/// a plane by 3 d over the least height h of the triangle at most (Σ d |∇λ| over the barycentric λ, with |∇λ| ≤ 1/h), and
+/// h by 2 d.
+fn rounding_tilt(transform: &DAffine3) -> f64 {
+    let corners = UNIT.map(|v| transform.transform_point3(Vec3::from(v).as_dvec3()));
+    let largest = corners.iter().map(|corner| corner.abs().max_element()).fold(0.0, f64::max);
+    let displacement = 3f64.sqrt() * largest * 0.5 * f64::from(f32::EPSILON);
+    let [a, b, c] = corners;
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let height = (b - a).cross(c - a).length() / longest;
+    if height > 2.0 * displacement {
+        (3.0 * displacement / (height - 2.0 * displacement)).atan()
+    } else {
+        std::f64::consts::PI
+    }
+}
+
 #[test]
 fn normals_stay_perpendicular_under_any_invertible_transform() {
     let mut random = Random(5);
     for _ in 0..200 {
-        let scale = DVec3::new(10f64.powf(random.signed() * 6.0), 0.01 + random.unit(), -random.unit() - 0.1);
+        let scale = DVec3::new(10f64.powf(random.between(-1.0, 1.0) * 6.0), 0.01 + random.unit(), -random.unit() - 0.1);
         let mut transform = random_transform(&mut random, scale, 3.0);
         transform.matrix3 *= DMat3::from_cols(DVec3::X, DVec3::new(0.7, 1.0, 0.0), DVec3::new(0.2, -0.4, 1.0));
         let prepared = prepared(&smooth_scene(&[transform]));
@@ -102,7 +119,8 @@ fn normals_stay_perpendicular_under_any_invertible_transform() {
         let normal = DVec3::from(vertex(&prepared, record.vertices[0]).normal.map(f64::from));
         assert!(normal.dot(exact.normalize()) > 1.0 - 1e-6, "{normal} {exact}");
         assert!((normal.length() - 1.0).abs() < 1e-6);
-        assert!(normal.dot(geometric_normal(&leaf)) > 0.99);
+        let angle = normal.angle_between(geometric_normal(&leaf));
+        assert!(angle < rounding_tilt(&transform) + 1e-6, "{angle} {transform:?}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Small scenes made by hand, random numbers, and a reference traversal of the slots.
+//! Small scenes made by hand, and a reference traversal of the slots.
 #![allow(dead_code, unreachable_pub, reason = "each test crate uses its part")]
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -7,41 +7,7 @@ use sunfleck::prepare::bvh::{Slot, decode, is_present};
 use sunfleck::prepare::{PrepareOptions, Prepared, prepare};
 use sunfleck::scene::{Instance, Material, Mesh, Primitive, Scene};
 
-/// SplitMix64 (Steele et al. 2014).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// In [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// In [−1, 1).
-    pub fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    pub fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.signed(), self.signed(), self.signed())
-    }
-
-    pub fn direction(&mut self) -> DVec3 {
-        loop {
-            let v = self.vector();
-            if v.length_squared() > 1e-4 && v.length_squared() <= 1.0 {
-                return v.normalize();
-            }
-        }
-    }
-}
+pub use crate::common::random::Random;
 
 pub type TriangleVertices = [[f32; 3]; 3];
 
@@ -79,8 +45,8 @@ pub fn slots(prepared: &Prepared) -> Vec<Slot> {
 pub fn random_triangles(random: &mut Random, count: usize, spread: f64, size: f64) -> Vec<TriangleVertices> {
     (0..count)
         .map(|_| {
-            let center = random.vector() * spread;
-            [0, 1, 2].map(|_| (center + random.vector() * size).as_vec3().into())
+            let center = random.point(1.0) * spread;
+            [0, 1, 2].map(|_| (center + random.point(1.0) * size).as_vec3().into())
         })
         .collect()
 }
@@ -191,5 +157,5 @@ pub fn random_transform(random: &mut Random, scale: DVec3, spread: f64) -> DAffi
     let x = random.direction();
     let y = random.direction().reject_from(x).normalize();
     let rotation = DMat3::from_cols(x, y, x.cross(y));
-    DAffine3 { matrix3: rotation * DMat3::from_diagonal(scale), translation: random.vector() * spread }
+    DAffine3 { matrix3: rotation * DMat3::from_diagonal(scale), translation: random.point(1.0) * spread }
 }

@@ -1,5 +1,6 @@
 //! The statistics that the other tests rely on, held against SciPy, and shown to reject what they must reject.
 
+use crate::common::random::Random;
 use crate::common::reference::{RESOLUTION, Reference, TILE};
 use crate::common::statistics::{
     Comparison, Estimate, TileStatistics, beta_regularised, binomial_two_sided, chi_square_test, chi_square_upper_tail,
@@ -10,23 +11,6 @@ use crate::common::statistics::{
 #[track_caller]
 fn assert_close(found: f64, expected: f64) {
     assert!((found - expected).abs() <= 5e-8 * expected.abs(), "found {found:.10e}, expected {expected:.10e}");
-}
-
-/// A deterministic stream of uniform numbers in [0, 1) (SplitMix64, Steele et al. 2014).
-struct Uniform(u64);
-
-impl Uniform {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * 2.0_f64.powi(-53)
-    }
-
-    fn normal(&mut self) -> f64 {
-        normal_quantile(self.next().max(1e-15))
-    }
 }
 
 #[test]
@@ -111,18 +95,18 @@ fn samples_that_no_cell_expects_are_found() {
 
 #[test]
 fn chi_square_rejects_the_wrong_density_and_keeps_its_level() {
-    let mut uniform = Uniform(1);
+    let mut uniform = Random(1);
     let expected = vec![1000.0; 64];
     let (mut rejected, trials) = (0, 400);
     for _ in 0..trials {
         let mut counts = [0; 64];
-        (0..64_000).for_each(|_| counts[(uniform.next() * 64.0) as usize] += 1);
+        (0..64_000).for_each(|_| counts[(uniform.unit() * 64.0) as usize] += 1);
         rejected += u64::from(chi_square_test(&counts, &expected, 64_000).p_value < 0.05);
     }
     assert!(binomial_two_sided(rejected, trials, 0.05) > 1e-3, "{rejected} of {trials} rejected at 5 %");
 
     let mut counts = [0; 64];
-    (0..64_000).for_each(|_| counts[(uniform.next().powf(1.05) * 64.0) as usize] += 1);
+    (0..64_000).for_each(|_| counts[(uniform.unit().powf(1.05) * 64.0) as usize] += 1);
     assert!(chi_square_test(&counts, &expected, 64_000).p_value < 1e-6);
 }
 
@@ -160,7 +144,7 @@ fn tiles_are_means_over_pixels_and_seeds() {
 }
 
 /// Tiles with the means of the reference and noise of the size of its own errors, `scale` times as bright.
-fn simulated(reference: &Reference, scale: f64, random: &mut Uniform) -> Vec<Estimate> {
+fn simulated(reference: &Reference, scale: f64, random: &mut Random) -> Vec<Estimate> {
     let noisy = |tile: &Estimate| {
         let deviation = (tile.variance * tile.count).sqrt();
         let values: Vec<f64> = (0..32).map(|_| scale * tile.mean + deviation * random.normal()).collect();
@@ -172,7 +156,7 @@ fn simulated(reference: &Reference, scale: f64, random: &mut Uniform) -> Vec<Est
 #[test]
 fn the_comparison_accepts_equals_and_rejects_one_percent() {
     let reference = Reference::reflected(Some(1));
-    let mut random = Uniform(7);
+    let mut random = Random(7);
     let same = Comparison::new(&reference.tiles, &simulated(&reference, 1.0, &mut random), 0.01);
     assert!(same.passed(), "{same}");
     let brighter = Comparison::new(&reference.tiles, &simulated(&reference, 1.01, &mut random), 0.01);
