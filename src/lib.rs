@@ -39,6 +39,7 @@ pub mod error;
 pub mod film;
 pub mod gpu;
 pub mod layout;
+mod named_enum;
 pub mod prepare;
 pub mod render;
 pub mod scene;

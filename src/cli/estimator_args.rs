@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use sunfleck::render::{
-    DeviceChoice, EnvSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings, TraceChoice,
+    DeviceChoice, EnvironmentSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings, TraceChoice,
 };
 use sunfleck::{Error, Result};
 
@@ -42,8 +42,8 @@ pub(crate) struct EstimatorArgs {
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true, value_parser = parse::finite, help_heading = "Environment")]
     env_rotation: f64,
     /// How directions to the environment are chosen.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<EnvSampling>(EnvSampling::NAMES), help_heading = "Environment")]
-    env_sampling: EnvSampling,
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<EnvironmentSampling>(EnvironmentSampling::NAMES), help_heading = "Environment")]
+    env_sampling: EnvironmentSampling,
 
     /// Device to render on: a number or a part of a name (see `sunfleck devices`), all, or auto.
     #[arg(long, value_name = "NAME|INDEX|all|auto", default_value_t, help_heading = "Device")]

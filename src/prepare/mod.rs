@@ -34,6 +34,7 @@ use self::materials::MaterialTable;
 use self::pack::{pack, pack_words};
 use self::textures::TextureTable;
 use crate::layout::{InstanceRecord, RenderConstants, SCENE_ARRAYS, SceneArray, Texel};
+use crate::named_enum::named_enum;
 use crate::scene::Scene;
 
 /// Coordinates beyond this many metres from the camera are refused: the square of a distance must stay in f32, and so
@@ -64,14 +65,15 @@ impl Default for PrepareOptions {
     }
 }
 
-/// How directions towards an environment image are picked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum EnvironmentSampling {
-    /// By the image's brightness.
-    #[default]
-    Importance,
-    /// Uniformly over the sphere.
-    Uniform,
+named_enum! {
+    /// How directions to an image environment are chosen.
+    EnvironmentSampling, "environment sampling" {
+        /// In proportion to its luminance.
+        #[default]
+        Importance = "importance",
+        /// Evenly over the sphere.
+        Uniform = "uniform",
+    }
 }
 
 /// Why a scene cannot be prepared.

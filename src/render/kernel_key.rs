@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{EnvSampling, Integrator, LightSampling, MisHeuristic, Settings};
+use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, Settings};
 use crate::gpu::{ArrayForm, TraceBackend};
 use crate::prepare::{EnvironmentKind, Features, Prepared};
 use crate::scene::{Camera, Projection};
@@ -34,7 +34,7 @@ pub struct KernelKey {
     /// How two samples are weighed.
     pub mis_heuristic: MisHeuristic,
     /// How environment directions are drawn.
-    pub env_sampling: EnvSampling,
+    pub env_sampling: EnvironmentSampling,
 }
 
 impl KernelKey {

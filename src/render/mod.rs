@@ -25,13 +25,14 @@ pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
 pub use run::{Run, RunPlan};
 pub use scene_buffers::choose_array_form;
 pub use settings::{
-    DeviceChoice, EnvSampling, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings,
-    TraceChoice, choose_camera,
+    DeviceChoice, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings, TraceChoice,
+    choose_camera,
 };
 
 use crate::film::metadata::{world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective};
 use crate::film::replicates::ReplicateSums;
-use crate::prepare::{self, EnvironmentSampling, PrepareOptions, Prepared};
+pub use crate::prepare::EnvironmentSampling;
+use crate::prepare::{self, PrepareOptions, Prepared};
 use crate::scene::{Camera, Projection, Scene};
 use crate::{Error, Result};
 
@@ -42,10 +43,7 @@ use crate::{Error, Result};
 pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Prepared> {
     let options = PrepareOptions {
         camera: camera.camera_to_world.translation,
-        environment_sampling: match settings.env_sampling {
-            EnvSampling::Importance => EnvironmentSampling::Importance,
-            EnvSampling::Uniform => EnvironmentSampling::Uniform,
-        },
+        environment_sampling: settings.env_sampling,
         ..PrepareOptions::default()
     };
     Ok(prepare::prepare(scene, &options)?)

@@ -7,6 +7,8 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use crate::film::Film;
+use crate::named_enum::named_enum;
+use crate::prepare::EnvironmentSampling;
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -40,7 +42,7 @@ pub struct Settings {
     /// How [`LightSampling::Mis`] weighs its two samples.
     pub mis_heuristic: MisHeuristic,
     /// How directions to an image environment are chosen.
-    pub env_sampling: EnvSampling,
+    pub env_sampling: EnvironmentSampling,
     /// The pixel filter.
     pub filter: PixelFilter,
     /// Which implementation traces rays.
@@ -71,7 +73,7 @@ impl Default for Settings {
             sampler: SamplerKind::default(),
             light_sampling: LightSampling::default(),
             mis_heuristic: MisHeuristic::default(),
-            env_sampling: EnvSampling::default(),
+            env_sampling: EnvironmentSampling::default(),
             filter: PixelFilter::default(),
             trace: TraceChoice::default(),
             device: DeviceChoice::default(),
@@ -95,43 +97,6 @@ impl Settings {
         let most = film.pixels().iter().map(|pixel| pixel.count).max().unwrap_or(0);
         asked.start..asked.start.saturating_add(most).min(asked.end)
     }
-}
-
-/// An enum whose values have names on the command line: `ALL`, `name()`, `Display` and `FromStr`.
-macro_rules! named_enum {
-    ($(#[$doc:meta])* $name:ident, $what:literal { $($(#[$variant_doc:meta])* $variant:ident = $text:literal,)+ }) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-        pub enum $name { $($(#[$variant_doc])* $variant,)+ }
-
-        impl $name {
-            /// Every value, in the order of the documentation.
-            pub const ALL: &[Self] = &[$(Self::$variant),+];
-            /// The names of all values.
-            pub const NAMES: &[&str] = &[$($text),+];
-
-            /// The name on the command line.
-            pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $text),+ }
-            }
-        }
-
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(self.name())
-            }
-        }
-
-        impl FromStr for $name {
-            type Err = String;
-
-            fn from_str(name: &str) -> std::result::Result<Self, String> {
-                Self::ALL.iter().copied().find(|value| value.name() == name).ok_or_else(|| {
-                    format!(concat!("unknown ", $what, " '{}'; there are {}"), name, Self::NAMES.join(", "))
-                })
-            }
-        }
-    };
 }
 
 named_enum! {
@@ -172,17 +137,6 @@ named_enum! {
         /// p² / Σ p².
         #[default]
         Power = "power",
-    }
-}
-
-named_enum! {
-    /// How directions to an image environment are chosen.
-    EnvSampling, "environment sampling" {
-        /// In proportion to its luminance.
-        #[default]
-        Importance = "importance",
-        /// Evenly over the sphere.
-        Uniform = "uniform",
     }
 }
 

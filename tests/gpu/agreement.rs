@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::scenes::{all_scenes, scene, short_form};
 use crate::common::statistics::Estimate;
 use crate::common::{gpu, scenes};
-use sunfleck::render::{EnvSampling, LightSampling, MisHeuristic, Settings};
+use sunfleck::render::{EnvironmentSampling, LightSampling, MisHeuristic, Settings};
 use sunfleck::scene::{Environment, Scene};
 
 /// Small films: these tests compare means of images.
@@ -91,11 +91,11 @@ fn environment_samplings_agree() {
     let settings = settings();
     let reference = mean(&scene, &settings);
     for (env_sampling, light_sampling) in [
-        (EnvSampling::Uniform, LightSampling::Mis),
-        (EnvSampling::Importance, LightSampling::Mixture),
-        (EnvSampling::Importance, LightSampling::Nee),
-        (EnvSampling::Uniform, LightSampling::Nee),
-        (EnvSampling::Importance, LightSampling::Bsdf),
+        (EnvironmentSampling::Uniform, LightSampling::Mis),
+        (EnvironmentSampling::Importance, LightSampling::Mixture),
+        (EnvironmentSampling::Importance, LightSampling::Nee),
+        (EnvironmentSampling::Uniform, LightSampling::Nee),
+        (EnvironmentSampling::Importance, LightSampling::Bsdf),
     ] {
         let other = Settings { env_sampling, light_sampling, ..settings.clone() };
         assert_agree(&format!("importance mis and {env_sampling} {light_sampling}"), reference, mean(&scene, &other));
