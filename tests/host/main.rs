@@ -7,6 +7,7 @@ mod bench;
 mod film_images;
 mod film_metrics;
 mod film_sums;
+mod prepare_alpha;
 mod prepare_bvh;
 mod prepare_environment;
 mod prepare_geometry;
