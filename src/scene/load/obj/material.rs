@@ -1,6 +1,7 @@
 //! MTL material libraries, as they stand in the file.
 
 use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 use super::parse::{keyword, logical_lines};
@@ -8,14 +9,30 @@ use super::{at_line, beside};
 use crate::scene::load::warnings::Warnings;
 use crate::scene::{SceneResult, Wrap};
 
-/// A texture of a material.
+/// A texture of a material. Two are equal if they show the same, wherever they are named.
 #[derive(Clone, Debug)]
 pub(super) struct MtlTexture {
     pub(super) file: PathBuf,
     pub(super) wrap: Wrap,
+    /// `-bm`, which scales normals.
+    pub(super) scale: f32,
     /// Where it was named: the library and the line.
     pub(super) library: PathBuf,
     pub(super) line: usize,
+}
+
+impl PartialEq for MtlTexture {
+    fn eq(&self, other: &Self) -> bool {
+        self.file == other.file && self.wrap == other.wrap
+    }
+}
+
+impl Eq for MtlTexture {}
+
+impl Hash for MtlTexture {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.file.hash(state);
+    }
 }
 
 /// A material of a library; `None` where the file says nothing.
@@ -29,10 +46,24 @@ pub(super) struct MtlMaterial {
     /// 1 is opaque.
     pub(super) dissolve: Option<f32>,
     pub(super) illum: Option<u32>,
+    /// Phong exponent (`Ns`).
+    pub(super) exponent: Option<f32>,
+    /// Some statement of the PBR extension is there.
+    pub(super) is_pbr: bool,
+    pub(super) roughness: Option<f32>,
+    pub(super) metallic: Option<f32>,
+    pub(super) anisotropy: Option<f32>,
+    /// In turns.
+    pub(super) anisotropy_rotation: Option<f32>,
     pub(super) diffuse_texture: Option<MtlTexture>,
+    pub(super) specular_texture: Option<MtlTexture>,
     pub(super) emission_texture: Option<MtlTexture>,
-    /// Texture statements that are not honoured.
-    pub(super) ignored_maps: Vec<String>,
+    pub(super) alpha_texture: Option<MtlTexture>,
+    pub(super) roughness_texture: Option<MtlTexture>,
+    pub(super) metallic_texture: Option<MtlTexture>,
+    pub(super) normal_texture: Option<MtlTexture>,
+    /// Statements that are not honoured.
+    pub(super) ignored: Vec<String>,
     /// For messages.
     pub(super) place: String,
 }
@@ -77,12 +108,35 @@ fn statement(
         "d" => material.dissolve = Some(place.number(word, rest.trim_start_matches("-halo"))?),
         "Tr" => material.dissolve = Some(1.0 - place.number(word, rest)?),
         "illum" => material.illum = Some(place.number(word, rest)? as u32),
+        "Ns" => material.exponent = Some(place.number(word, rest)?),
+        "Pr" | "Pm" | "aniso" | "anisor" => {
+            let number = Some(place.number(word, rest)?);
+            material.is_pbr = true;
+            match word {
+                "Pr" => material.roughness = number,
+                "Pm" => material.metallic = number,
+                "aniso" => material.anisotropy = number,
+                _ => material.anisotropy_rotation = number,
+            }
+        }
+        // Sheen, clearcoat and its roughness.
+        "Ps" | "Pc" | "Pcr" => {
+            material.is_pbr = true;
+            if place.number(word, rest)? > 0.0 && word != "Pcr" {
+                material.ignored.push(word.to_owned());
+            }
+        }
         "map_Kd" => material.diffuse_texture = place.texture(rest, warnings),
+        "map_Ks" => material.specular_texture = place.texture(rest, warnings),
+        "map_d" => material.alpha_texture = place.texture(rest, warnings),
+        "map_Pr" => (material.is_pbr, material.roughness_texture) = (true, place.texture(rest, warnings)),
+        "map_Pm" => (material.is_pbr, material.metallic_texture) = (true, place.texture(rest, warnings)),
+        "norm" | "map_norm" | "map_Kn" => material.normal_texture = place.texture(rest, warnings),
         "map_Ke" | "map_emissive" => material.emission_texture = place.texture(rest, warnings),
         // Ambient light is what a path tracer computes.
         "map_Ka" => {}
-        _ if word.starts_with("map_") || matches!(word, "bump" | "norm" | "disp" | "decal" | "refl") => {
-            material.ignored_maps.push(word.to_owned());
+        _ if word.starts_with("map_") || matches!(word, "bump" | "disp" | "decal" | "refl") => {
+            material.ignored.push(word.to_owned());
         }
         _ => {}
     }
@@ -127,6 +181,7 @@ impl Place<'_> {
     fn texture(&self, text: &str, warnings: &mut Warnings) -> Option<MtlTexture> {
         let mut rest = text.trim();
         let mut wrap = Wrap::Repeat;
+        let mut scale = 1.0;
         while rest.starts_with('-') {
             let (option, after) = keyword(rest);
             let (greatest, only_numbers) = match option {
@@ -146,9 +201,12 @@ impl Place<'_> {
                 if option == "-clamp" && value == "on" {
                     wrap = Wrap::ClampToEdge;
                 }
+                if option == "-bm" {
+                    scale = value.parse().ok().filter(|scale: &f32| scale.is_finite()).unwrap_or(1.0);
+                }
                 rest = after;
             }
-            if !matches!(option, "-clamp" | "-blendu" | "-blendv" | "-cc" | "-texres" | "-type") {
+            if !matches!(option, "-bm" | "-clamp" | "-blendu" | "-blendv" | "-cc" | "-texres" | "-type") {
                 let subject = format!("texture option {option} is not supported and ignored");
                 warnings.add(subject, format!("{} line {}", self.path.display(), self.line));
             }
@@ -158,6 +216,6 @@ impl Place<'_> {
             let subject = "a texture statement without a file name is ignored";
             warnings.add(subject, format!("{} line {}", self.path.display(), self.line));
         }
-        file.map(|file| MtlTexture { file, wrap, library: self.path.to_owned(), line: self.line })
+        file.map(|file| MtlTexture { file, wrap, scale, library: self.path.to_owned(), line: self.line })
     }
 }
