@@ -234,6 +234,29 @@ fn maps_of_several_files_become_one_image() {
     assert_eq!((base(colour), colour.alpha_mode), ((2, 1, vec![[10, 20, 30, 255]; 2]), AlphaMode::Opaque));
 }
 
+/// Blender writes normals as `map_Bump`; heights are grey.
+#[test]
+fn a_bump_map_of_normals_is_one() {
+    let images = [
+        ("normals.png", png(2, 2, [120, 135, 240, 255])),
+        ("heights.png", png(2, 2, [200, 200, 200, 255])),
+        ("norm.png", png(1, 1, [128, 128, 255, 255])),
+    ];
+    let scene = library(
+        "newmtl normals\nmap_Bump -bm 0.5 normals.png\n\
+         newmtl heights\nbump heights.png\n\
+         newmtl other heights\nPr 1\nmap_bump heights.png\n\
+         newmtl both\nmap_Bump gone.png\nnorm norm.png\n",
+        &images,
+    );
+    let [normals, heights, other, both] = &scene.materials[..] else { panic!("four materials") };
+    assert_eq!((texels(&scene, normals.normal_texture).2[0], normals.normal_scale), ([120, 135, 240, 255], 0.5));
+    assert!(heights.normal_texture.is_none() && other.normal_texture.is_none());
+    assert_eq!((texels(&scene, both.normal_texture).0, both.normal_scale), (1, 1.0));
+    assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
+    assert!(scene.warnings[0].contains("heights") && scene.warnings[0].contains("2 times"), "{:?}", scene.warnings);
+}
+
 /// An enlarged map keeps its texels where they were.
 #[test]
 fn maps_of_different_sizes_are_aligned() {

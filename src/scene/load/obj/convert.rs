@@ -11,7 +11,7 @@
 //! | else | Lambertian of `Kd` |
 //!
 //! *Transparent* means `Ni` other than 1, or `Tf` other than black, or `d` below 1. Where that makes no glass, `d` × `map_d`
-//! is alpha. `Ke` × `map_Ke` is emitted, from the front. `Kd` defaults to 0.8, or to white where there is `map_Kd`; `Ke` to
+//! is alpha. `norm` is a map of normals, and so is `map_Bump` where its image looks like one. `Ke` × `map_Ke` is emitted, from the front. `Kd` defaults to 0.8, or to white where there is `map_Kd`; `Ke` to
 //! black, or to white where there is `map_Ke`. `Ka` is ignored.
 
 use super::material::{MtlMaterial, MtlTexture};
@@ -39,6 +39,9 @@ pub(super) fn convert(name: &str, mtl: &MtlMaterial, textures: &mut Textures, wa
     {
         warn("mirrors (illum 3, 5, 8) have no diffuse part: Kd is ignored");
     }
+    if let Some(bump) = mtl.bump_texture.as_ref().filter(|bump| mtl.normal_texture.is_none() && !bump.file.exists()) {
+        warn(&format!("the bump map {} does not exist: it is ignored", bump.file.display()));
+    }
     for statement in &mtl.ignored {
         warn(&format!("{statement} is not supported yet and ignored{}", why_ignored(statement)));
     }
@@ -49,7 +52,6 @@ fn why_ignored(statement: &str) -> &'static str {
     match statement {
         "Ps" => " (sheen)",
         "Pc" => " (clearcoat)",
-        "bump" | "map_bump" | "map_Bump" => " (heights; a map of normals is read from `norm`)",
         _ => "",
     }
 }
@@ -163,10 +165,10 @@ fn bind_textures(material: &mut Material, mtl: &MtlMaterial, has_color_maps: boo
         Some(alpha) => Some(Source::ColorAlpha { color: mtl.diffuse_texture.clone(), alpha }),
         None => file(&mtl.diffuse_texture),
     });
-    if let Some(normals) = &mtl.normal_texture {
-        material.normal_scale = normals.scale;
-        material.normal_texture = bind(Some(Source::File(normals.clone())));
-    }
+    // Which of the two a bump map is can only be seen in its image: see `drop_heights`.
+    let bump = mtl.bump_texture.clone().filter(|bump| bump.file.exists()).map(Source::Bump);
+    material.normal_scale = mtl.normal_texture.as_ref().or(mtl.bump_texture.as_ref()).map_or(1.0, |map| map.scale);
+    material.normal_texture = bind(file(&mtl.normal_texture).or(bump));
     if material.bsdf != Bsdf::MetallicRoughness {
         return;
     }

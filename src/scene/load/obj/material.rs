@@ -62,6 +62,8 @@ pub(super) struct MtlMaterial {
     pub(super) roughness_texture: Option<MtlTexture>,
     pub(super) metallic_texture: Option<MtlTexture>,
     pub(super) normal_texture: Option<MtlTexture>,
+    /// Heights by MTL, normals in the files of some exporters.
+    pub(super) bump_texture: Option<MtlTexture>,
     /// Statements that are not honoured.
     pub(super) ignored: Vec<String>,
     /// For messages.
@@ -131,11 +133,12 @@ fn statement(
         "map_d" => material.alpha_texture = place.texture(rest, warnings),
         "map_Pr" => (material.is_pbr, material.roughness_texture) = (true, place.texture(rest, warnings)),
         "map_Pm" => (material.is_pbr, material.metallic_texture) = (true, place.texture(rest, warnings)),
+        "bump" | "map_bump" | "map_Bump" => material.bump_texture = place.texture(rest, warnings),
         "norm" | "map_norm" | "map_Kn" => material.normal_texture = place.texture(rest, warnings),
         "map_Ke" | "map_emissive" => material.emission_texture = place.texture(rest, warnings),
         // Ambient light is what a path tracer computes.
         "map_Ka" => {}
-        _ if word.starts_with("map_") || matches!(word, "bump" | "disp" | "decal" | "refl") => {
+        _ if word.starts_with("map_") || matches!(word, "disp" | "decal" | "refl") => {
             material.ignored.push(word.to_owned());
         }
         _ => {}

@@ -65,6 +65,7 @@ pub(super) fn load(path: &Path) -> SceneResult<Scene> {
     scene.textures = textures;
     let images: Vec<SceneResult<_>> = pending.par_iter().map(textures::decode).collect();
     scene.images = images.into_iter().collect::<SceneResult<_>>()?;
+    textures::drop_heights(&mut scene, &pending, &mut warnings);
     scene.warnings = warnings.into_lines();
     Ok(scene)
 }

@@ -6,13 +6,16 @@ use std::collections::HashMap;
 use super::material::MtlTexture;
 use super::{at_line, file};
 use crate::scene::load::image::decode_texture;
-use crate::scene::{Filter, Image, SceneResult, Texels, Texture, TextureBinding};
+use crate::scene::load::warnings::Warnings;
+use crate::scene::{Filter, Image, Scene, SceneResult, Texels, Texture, TextureBinding};
 
 /// What an image is made of.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Source {
     /// A file as it is.
     File(MtlTexture),
+    /// A bump map: normals or heights, as its image shows.
+    Bump(MtlTexture),
     /// Colour, or white, with the alpha of another file.
     ColorAlpha { color: Option<MtlTexture>, alpha: MtlTexture },
     /// Roughness in G and metalness in B, 1 where there is no file.
@@ -23,7 +26,7 @@ impl Source {
     /// The map that decides how the image is wrapped.
     fn first(&self) -> Option<&MtlTexture> {
         match self {
-            Self::File(texture) => Some(texture),
+            Self::File(texture) | Self::Bump(texture) => Some(texture),
             Self::ColorAlpha { color, alpha } => color.as_ref().or(Some(alpha)),
             Self::RoughnessMetallic { roughness, metallic } => roughness.as_ref().or(metallic.as_ref()),
         }
@@ -62,11 +65,38 @@ impl Textures {
     }
 }
 
+/// Takes away the bump maps that hold heights, which nothing here can use, and says so. MTL means heights by `map_Bump`, but
+/// Blender and others write tangent-space normals there. Those are bluish: the mean of z, stored as (z + 1)/2 in blue, is
+/// well above that of x and y, which is near 0.
+pub(super) fn drop_heights(scene: &mut Scene, sources: &[Source], warnings: &mut Warnings) {
+    let heights: Vec<bool> =
+        sources.iter().zip(&scene.images).map(|(s, image)| matches!(s, Source::Bump(_)) && !is_bluish(image)).collect();
+    for material in &mut scene.materials {
+        if material.normal_texture.is_some_and(|binding| heights[scene.textures[binding.texture].image]) {
+            material.normal_texture = None;
+            let subject = "bump maps of heights (map_Bump) are not supported yet: the surface is smooth";
+            warnings.add(subject, format!("\"{}\"", material.name));
+        }
+    }
+}
+
+/// Whether blue is above red and green by an eighth of the range in the mean.
+fn is_bluish(image: &Image) -> bool {
+    fn sums<T: Copy + Into<u64>>(texels: &[[T; 4]]) -> [u64; 3] {
+        texels.iter().fold([0; 3], |sums, texel| [0, 1, 2].map(|k| sums[k] + texel[k].into()))
+    }
+    let ([red, green, blue], white) = match &image.texels {
+        Texels::Rgba8(texels) => (sums(texels), 255 * texels.len() as u64),
+        Texels::Rgba16(texels) => (sums(texels), 65535 * texels.len() as u64),
+    };
+    8 * blue > 8 * red.max(green) + white
+}
+
 /// Reads or makes an image.
 pub(super) fn decode(source: &Source) -> SceneResult<Image> {
     let map = |texture: &Option<MtlTexture>| texture.as_ref().map(read).transpose();
     match source {
-        Source::File(texture) => read(texture),
+        Source::File(texture) | Source::Bump(texture) => read(texture),
         Source::ColorAlpha { color, alpha } => {
             let (color, alpha) = (map(color)?, read(alpha)?);
             // An image with an alpha channel has it there, any other is grey.
