@@ -163,7 +163,7 @@ fn the_pbr_extension() {
 fn classic_highlights() {
     let scene = library(
         "newmtl plastic\nKd 0.5 0.1 0.1\nKs 0.5 0.25 1\nNs 30\nNi 1.2\nillum 2\n\
-         newmtl no model\nKd 0.5 0.1 0.1\nKs 0.5 0.5 0.5\n\
+         newmtl no model\nKd 0.5 0.1 0.1\nKs 0.5 0.5 0.5\nNs -1.960784\n\
          newmtl metal\nKd 0 0 0\nKs 0.9 0.7 0.3\nNs 1000\nillum 2\n\
          newmtl without highlights\nKd 0.5 0.1 0.1\nKs 0.5 0.5 0.5\nillum 1\n\
          newmtl bright\nKd 0.5 0.1 0.1\nKs 9 0 0\n\

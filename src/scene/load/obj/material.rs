@@ -110,15 +110,16 @@ fn statement(
         "d" => material.dissolve = Some(place.number(word, rest.trim_start_matches("-halo"))?),
         "Tr" => material.dissolve = Some(1.0 - place.number(word, rest)?),
         "illum" => material.illum = Some(place.number(word, rest)? as u32),
-        "Ns" => material.exponent = Some(place.number(word, rest)?),
-        "Pr" | "Pm" | "aniso" | "anisor" => {
+        // Old exporters write exponents a little below 0.
+        "Ns" => material.exponent = Some(place.signed_number(word, rest)?.max(0.0)),
+        "anisor" => (material.is_pbr, material.anisotropy_rotation) = (true, Some(place.signed_number(word, rest)?)),
+        "Pr" | "Pm" | "aniso" => {
             let number = Some(place.number(word, rest)?);
             material.is_pbr = true;
             match word {
                 "Pr" => material.roughness = number,
                 "Pm" => material.metallic = number,
-                "aniso" => material.anisotropy = number,
-                _ => material.anisotropy_rotation = number,
+                _ => material.anisotropy = number,
             }
         }
         // Sheen, clearcoat and its roughness.
@@ -154,10 +155,18 @@ struct Place<'a> {
 
 impl Place<'_> {
     fn number(&self, word: &str, text: &str) -> SceneResult<f32> {
+        self.number_that(word, text, "a finite number of at least 0", |number| number >= 0.0)
+    }
+
+    fn signed_number(&self, word: &str, text: &str) -> SceneResult<f32> {
+        self.number_that(word, text, "a finite number", |_| true)
+    }
+
+    fn number_that(&self, word: &str, text: &str, what: &str, fits: impl Fn(f32) -> bool) -> SceneResult<f32> {
         let first = text.split_whitespace().next().unwrap_or_default();
-        let number = first.parse::<f32>().ok().filter(|number| number.is_finite() && *number >= 0.0);
+        let number = first.parse::<f32>().ok().filter(|number| number.is_finite() && fits(*number));
         number.ok_or_else(|| {
-            let message = format!("{word} must be a finite number of at least 0, not \"{first}\"");
+            let message = format!("{word} must be {what}, not \"{first}\"");
             at_line(self.path, self.line, message).hint("repair the line")
         })
     }
