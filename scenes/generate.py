@@ -54,8 +54,15 @@ class Scene:
         return len(self.doc["accessors"]) - 1
 
     def material(self, name, color=(1, 1, 1), extras=None, emission=None, metallic=None, roughness=None, ior=None,
-                 double_sided=False, texture=None):
-        material = {"name": name, "pbrMetallicRoughness": {"baseColorFactor": [*color, 1]}}
+                 double_sided=False, texture=None, alpha=None, cutoff=None):
+        """`alpha` makes it BLEND, `cutoff` MASK."""
+        factor = [*color, 1 if alpha is None else alpha]
+        material = {"name": name, "pbrMetallicRoughness": {"baseColorFactor": factor}}
+        if alpha is not None:
+            material["alphaMode"] = "BLEND"
+        if cutoff is not None:
+            material["alphaMode"] = "MASK"
+            material["alphaCutoff"] = cutoff
         pbr = material["pbrMetallicRoughness"]
         if metallic is not None:
             pbr["metallicFactor"] = metallic
@@ -87,9 +94,9 @@ class Scene:
         used = self.doc.setdefault("extensionsUsed", [])
         used.extend(e for e in extensions if e not in used)
 
-    def texture(self, png, nearest=False):
+    def texture(self, png, nearest=False, name="checker"):
         images = self.doc.setdefault("images", [])
-        images.append({"uri": "data:image/png;base64," + base64.b64encode(png).decode(), "name": "checker"})
+        images.append({"uri": "data:image/png;base64," + base64.b64encode(png).decode(), "name": name})
         samplers = self.doc.setdefault("samplers", [])
         samplers.append({"magFilter": 9728 if nearest else 9729, "wrapS": 10497, "wrapT": 10497})
         textures = self.doc.setdefault("textures", [])
@@ -245,17 +252,30 @@ def sphere(level, radius=1.0, smooth=True):
 
 
 def checker_png(size, dark, light):
-    """A checkerboard of 2×2 fields, 8 bits a channel."""
+    """A checkerboard of 2×2 fields."""
+    return png(size, lambda x, y: light if (x * 2 // size + y * 2 // size) % 2 == 0 else dark)
+
+
+def disc_png(size, color):
+    """A disc that fills the square, opaque inside and clear outside."""
+    middle = (size - 1) / 2
+    inside = lambda x, y: math.hypot(x - middle, y - middle) < size / 2
+    return png(size, lambda x, y: (*color, 255 if inside(x, y) else 0))
+
+
+def png(size, texel):
+    """A square image of 8 bits a channel; texel(x, y) is RGB or RGBA."""
     rows = bytearray()
     for y in range(size):
         rows.append(0)
         for x in range(size):
-            rows.extend(light if (x * 2 // size + y * 2 // size) % 2 == 0 else dark)
+            rows.extend(texel(x, y))
+    color_type = {3: 2, 4: 6}[len(texel(0, 0))]
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    header = struct.pack(">IIBBBBB", size, size, 8, 2, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", size, size, 8, color_type, 0, 0, 0)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(rows), 9)) + chunk(b"IEND", b"")
 
 
@@ -372,6 +392,28 @@ def textured():
     scene.write("textured")
 
 
+def alpha():
+    scene = Scene()
+    scene.environment((0.25, 0.3, 0.35))
+    scene.place("floor", floor(4), scene.diffuse("floor", (0.7, 0.7, 0.7)))
+    # A fence of discs by a mask: coloured and there inside of the discs, clear outside.
+    discs = scene.texture(disc_png(32, (200, 120, 60)), name="disc")
+    fence = quad((-2.5, 0, -1), (2.5, 0, -1), (2.5, 2, -1), (-2.5, 2, -1), 4)
+    scene.place("fence", fence, scene.diffuse("fence", (1, 1, 1), texture=discs, cutoff=0.5))
+    # One sheet three times: each lets 60 % through.
+    sheet = scene.mesh("sheet", (quad((-0.6, 0, 0), (0.6, 0, 0), (0.6, 1.2, 0), (-0.6, 1.2, 0), 1),
+                                 scene.material("sheet", (0.2, 0.4, 0.8), metallic=0, roughness=0.6, alpha=0.4)))
+    for i in range(3):
+        scene.node(name=f"sheet {i}", mesh=sheet, translation=[-1 + 0.4 * i, 0, 1 + 0.3 * i])
+    # A lamp that is half there, and another that is a glowing disc.
+    half = scene.diffuse("half a lamp", (0, 0, 0), emission=(8, 7, 6), double_sided=True, alpha=0.5)
+    scene.place("half a lamp", quad((0.8, 2.2, 0), (2, 2.2, 0), (2, 2.2, 1), (0.8, 2.2, 1), 1), half)
+    glow = scene.diffuse("disc", (0, 0, 0), emission=(2, 4, 8), double_sided=True, texture=discs, alpha=1)
+    scene.place("disc", quad((0.8, 0, 0.8), (1.8, 0, 0.8), (1.8, 1, 0.8), (0.8, 1, 0.8), 1), glow)
+    scene.camera((0, 1.8, 6), (0, 0.8, 0), 40)
+    scene.write("alpha")
+
+
 def metallic_roughness():
     scene = Scene()
     scene.environment((0.4, 0.45, 0.5))
@@ -424,6 +466,7 @@ if __name__ == "__main__":
     environment()
     instances()
     textured()
+    alpha()
     metallic_roughness()
     many_lights()
     caustic()

@@ -30,6 +30,7 @@ layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 const uint BOUNCE_CAP = 65535u;
 
 SampleKey sample_key(LaneState lane) { return SampleKey(lane.pixel, lane.sample_index, constants.seed); }
+uvec2 alpha_key(LaneState lane) { return alpha_key(sample_key(lane), lane.bounce, lane.ray.any_hit); }
 
 void start_sample(inout LaneState lane) {
     lane.bounce = 0u;
@@ -213,7 +214,7 @@ void main() {
     }
     uint ray_limit = lane.rays + slice.ray_budget;
     Trace trace;
-    trace_begin(trace, constants, lane.ray);
+    trace_begin(trace, constants, lane.ray, alpha_key(lane));
     while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
         trace_advance(trace, constants);
         if (!trace_done(trace)) continue;
@@ -221,7 +222,7 @@ void main() {
             finish_sample(lane);
             if (lane.sample_index < lane.end_sample) start_sample(lane);
         }
-        trace_begin(trace, constants, lane.ray);
+        trace_begin(trace, constants, lane.ray, alpha_key(lane));
     }
     bool complete = lane.sample_index >= lane.end_sample;
     results[index] = block_result(lane, complete);

@@ -38,6 +38,8 @@ pub const MAX_CHUNKS: usize = 4;
 pub const SLOT_LEAF: u32 = 1 << 31;
 /// Bit of `kind` that marks an instance.
 pub const SLOT_INSTANCE: u32 = 1 << 30;
+/// Bit of a leaf's `kind`: its material's alpha decides whether a ray meets it.
+pub const SLOT_ALPHA: u32 = 1 << 29;
 /// Bits of a leaf's `kind` that hold the material index.
 pub const SLOT_MATERIAL_MASK: u32 = (1 << 24) - 1;
 /// Slots stand in groups of this many: the children of one inner slot.
@@ -73,7 +75,7 @@ pub struct LeafSlot {
     pub triangle: u32,
     /// Index of the light it is ([`NONE`] if it does not emit); in an instanced mesh, relative to the instance's first light.
     pub light: u32,
-    /// [`SLOT_LEAF`] | material index.
+    /// [`SLOT_LEAF`] | [`SLOT_ALPHA`] where it holds | material index.
     pub kind: u32,
 }
 

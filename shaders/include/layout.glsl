@@ -7,6 +7,7 @@ const uint NONE = 0xffffffffu;
 
 const uint SLOT_LEAF = 0x80000000u;
 const uint SLOT_INSTANCE = 0x40000000u;
+const uint SLOT_ALPHA = 0x20000000u;
 const uint SLOT_MATERIAL_MASK = 0x00ffffffu;
 const uint SLOT_GROUP = 4u;
 const uint SLOT_TEXELS = 3u;

@@ -1,6 +1,7 @@
 // Sampling of lights: one is picked by the CDF over their power, then a point or direction of it.
 #ifndef LIGHT_GLSL
 #define LIGHT_GLSL
+#include "alpha.glsl"
 #include "cdf.glsl"
 #include "environment.glsl"
 #include "geometry.glsl"
@@ -43,8 +44,11 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     if (cosine == 0.0 || !emits_to_side(material, cosine > 0.0)) return NO_LIGHT;
     vec2 uv = HAS_TEXTURES ? interpolate_vertices(constants, vertices.triangle, light.instance, barycentric).texcoord
                            : vec2(0.0);
+    vec3 emission = material_emission(constants, material, uv);
+    // The shadow ray does not ask the triangle that it aims at whether it is there.
+    if (HAS_ALPHA) emission *= surface_opacity(constants, material, vertices.triangle, barycentric);
     float pdf = pick / point.area * (distance * distance) / abs(cosine);
-    return LightSample(direction, distance, material_emission(constants, material, uv) / pdf, pdf,
+    return LightSample(direction, distance, emission / pdf, pdf,
                        TriangleId(light.slot, light.instance));
 }
 

@@ -1,10 +1,11 @@
 // The trace interface. One implementation is compiled in (TRACE_BACKEND):
 //
-//   void trace_begin(out Trace trace, RenderConstants constants, Ray ray);
+//   void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alpha_key);   // see alpha.glsl
 //   void trace_advance(inout Trace trace, RenderConstants constants);   // a bounded amount of work
 //   bool trace_done(Trace trace);
 //   Hit  trace_hit(Trace trace);                                        // slot NONE: nothing was hit
 //
+// Alpha is part of the search: a triangle that is not there for the ray is passed.
 // A ray with a non-finite or zero direction or a non-finite origin hits nothing; t_max may be infinite.
 #ifndef TRACE_GLSL
 #define TRACE_GLSL

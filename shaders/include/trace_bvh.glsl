@@ -3,6 +3,7 @@
 // The traversal keeps for each inner node that still has children to visit one entry: its child group, and the ordered
 // list of those children, two bits each below a leading one. The newest entry is `top`; the next four stay in registers
 // (a store at a divergent address costs a branch a lane on software devices), the rest in memory.
+#include "alpha.glsl"
 #include "features.glsl"
 #include "records.glsl"
 
@@ -29,6 +30,7 @@ struct Trace {
     TriangleId towards;
     vec3 world_origin;
     vec3 world_direction;
+    uvec2 alpha_key;
 };
 
 uint trace_stack[STACK_SIZE];
@@ -66,7 +68,7 @@ void set_ray(inout Trace trace, vec3 origin, vec3 direction) {
     trace.inverse_direction = slab_inverse(direction);
 }
 
-void trace_begin(out Trace trace, RenderConstants constants, Ray ray) {
+void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alpha_key) {
     set_ray(trace, ray.origin, ray.direction);
     trace.hit = Hit(NO_TRIANGLE, ray.t_max, vec2(0.0));
     trace.current = ray_is_valid(ray) ? constants.root_slot : NONE;
@@ -82,6 +84,7 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray) {
     trace.towards = ray.towards;
     trace.world_origin = ray.origin;
     trace.world_direction = ray.direction;
+    trace.alpha_key = alpha_key;
 }
 
 bool trace_done(Trace trace) { return trace.current == NONE; }
@@ -159,7 +162,7 @@ vec3 rotate_axis(vec3 v, bool x_largest, bool y_largest) { return x_largest ? v.
 // same operations wherever it is shared, and edges are tested there by differences of products. Rounding is monotonic, so
 // a computed edge function never has the wrong sign, it can only be zero; zero counts as inside. Hence a closed mesh has
 // no gap. `precise` keeps the compiler from fusing, which would break the symmetry between neighbours.
-void visit_leaf(inout Trace trace, uvec4 q0, uvec4 q1, uvec4 q2) {
+void visit_leaf(inout Trace trace, RenderConstants constants, uvec4 q0, uvec4 q1, uvec4 q2) {
     vec3 magnitude = abs(trace.direction);
     bool x_largest = magnitude.x > magnitude.y && magnitude.x > magnitude.z;
     bool y_largest = !x_largest && magnitude.y > magnitude.z;
@@ -187,7 +190,11 @@ void visit_leaf(inout Trace trace, uvec4 q0, uvec4 q1, uvec4 q2) {
     bool excluded = same_triangle(triangle, trace.from) || same_triangle(triangle, trace.towards);
     // A zero determinant gives an infinite or undefined t, which fails here.
     if (inside && determinant != 0.0 && t > 0.0 && t < trace.hit.t && !excluded) {
-        trace.hit = Hit(triangle, t, vec2(v, w) / determinant);
+        vec2 barycentric = vec2(v, w) / determinant;
+        if (HAS_ALPHA && (q2.w & SLOT_ALPHA) != 0u &&
+            !alpha_hits(constants, trace.alpha_key, q2.w & SLOT_MATERIAL_MASK, q2.y, trace.instance, barycentric))
+            return;
+        trace.hit = Hit(triangle, t, barycentric);
     }
 }
 
@@ -221,7 +228,7 @@ void trace_step(inout Trace trace, RenderConstants constants) {
         return;
     }
     if (leaf) {
-        visit_leaf(trace, q0, q1, q2);
+        visit_leaf(trace, constants, q0, q1, q2);
         if (trace.any_hit && trace.hit.triangle.slot != NONE) {
             trace.current = NONE;
             return;

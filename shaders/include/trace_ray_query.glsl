@@ -1,5 +1,6 @@
 // The trace interface over VK_KHR_ray_query. Primitive i of a mesh is slot first + i (inner slots are degenerate
 // triangles there); the instance's custom index is ours, or 0xffffff for the baked mesh.
+#include "alpha.glsl"
 #include "features.glsl"
 #include "records.glsl"
 
@@ -11,36 +12,54 @@ struct Trace {
     Ray ray;
     Hit hit;
     float t_min;
+    uvec2 alpha_key;
     bool done;
 };
 
-void trace_begin(out Trace trace, RenderConstants constants, Ray ray) {
+void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alpha_key) {
     trace.ray = ray;
     trace.hit = Hit(NO_TRIANGLE, ray.t_max, vec2(0.0));
     trace.t_min = 0.0;
+    trace.alpha_key = alpha_key;
     trace.done = !ray_is_valid(ray);
 }
 
 bool trace_done(Trace trace) { return trace.done; }
 Hit trace_hit(Trace trace) { return trace.hit; }
 
+// The triangle of a primitive that a query names.
+TriangleId query_triangle(RenderConstants constants, uint custom, uint primitive) {
+    bool baked = custom == BAKED_INSTANCE;
+    uint first = HAS_INSTANCES && !baked ? load_instance_header(constants, custom).x : 0u;
+    return TriangleId(first + primitive, baked ? NONE : custom);
+}
+
+// Whether the ray meets the candidate. Only triangles of surfaces with alpha are candidates; the others are opaque
+// geometry, which the driver commits by itself.
+bool candidate_hits(RenderConstants constants, uvec2 key, TriangleId triangle, vec2 barycentric) {
+    uvec4 q2 = LOAD4(SLOTS, triangle.slot * SLOT_TEXELS + 2u);
+    return alpha_hits(constants, key, q2.w & SLOT_MATERIAL_MASK, q2.y, triangle.instance, barycentric);
+}
+
 void trace_advance(inout Trace trace, RenderConstants constants) {
     if (trace.done) return;
-    uint flags = gl_RayFlagsOpaqueEXT | (trace.ray.any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : 0u);
+    uint flags = (HAS_ALPHA ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT) | (trace.ray.any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : 0u);
     rayQueryEXT query;
     rayQueryInitializeEXT(query, top_level, flags, 0xffu, trace.ray.origin, trace.t_min, trace.ray.direction,
                           trace.ray.t_max);
     while (rayQueryProceedEXT(query)) {
+        if (!HAS_ALPHA) continue;
+        TriangleId candidate =
+            query_triangle(constants, uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false)),
+                           uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false)));
+        if (candidate_hits(constants, trace.alpha_key, candidate, rayQueryGetIntersectionBarycentricsEXT(query, false)))
+            rayQueryConfirmIntersectionEXT(query);
     }
     trace.done = true;
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT) return;
-    uint custom = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
-    uint primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
     float t = rayQueryGetIntersectionTEXT(query, true);
-    TriangleId triangle;
-    triangle.instance = custom == BAKED_INSTANCE ? NONE : custom;
-    triangle.slot = primitive;
-    if (HAS_INSTANCES && custom != BAKED_INSTANCE) triangle.slot += load_instance_header(constants, custom).x;
+    TriangleId triangle = query_triangle(constants, uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true)),
+                                         uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true)));
     // The triangles that the ray starts on or aims at do not count: search again behind the one, or before the other.
     // Each round shortens the interval, and nothing between them is lost.
     if (same_triangle(triangle, trace.ray.towards)) {

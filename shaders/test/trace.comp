@@ -13,7 +13,7 @@ void main() {
     Ray ray = Ray(uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), uintBitsToFloat(a.w), b.w != 0u,
                   TriangleId(c.x, c.y), TriangleId(c.z, c.w));
     Trace trace;
-    trace_begin(trace, constants, ray);
+    trace_begin(trace, constants, ray, uvec2(0u));
     while (!trace_done(trace)) trace_advance(trace, constants);
     Hit hit = trace_hit(trace);
     outputs[2u * lane] = uvec4(hit.triangle.slot, hit.triangle.instance, floatBitsToUint(hit.t), 0u);

@@ -46,7 +46,7 @@ void main() {
     uint misses = 0u;
     uint first_miss = NONE;
     Trace trace;
-    trace_begin(trace, constants, ray_at(counter));
+    trace_begin(trace, constants, ray_at(counter), uvec2(0u));
     while (counter != end) {
         trace_advance(trace, constants);
         if (!trace_done(trace)) continue;
@@ -55,7 +55,7 @@ void main() {
             first_miss = min(first_miss, counter);
         }
         counter += 1u;
-        trace_begin(trace, constants, ray_at(counter));
+        trace_begin(trace, constants, ray_at(counter), uvec2(0u));
     }
     outputs[lane] = uvec4(misses, first_miss, 0u, 0u);
 }

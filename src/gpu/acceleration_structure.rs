@@ -6,12 +6,20 @@ use ash::vk;
 
 use super::{Buffer, Dispatch, Gpu, GpuError, GpuResult, MemoryUse, Submission};
 
-/// A mesh as non-indexed storage of vertices with an index list.
+/// A mesh as vertices with one or more index lists. The index of a triangle in its list is what the shader sees.
 pub struct MeshGeometry<'a> {
     /// Vertices.
     pub vertices: &'a [[f32; 3]],
+    /// The lists; at least one.
+    pub parts: &'a [MeshPart],
+}
+
+/// Some triangles of a mesh.
+pub struct MeshPart {
     /// Three indices a triangle; degenerate triangles are allowed.
-    pub indices: &'a [[u32; 3]],
+    pub indices: Vec<[u32; 3]>,
+    /// Rays meet the triangles without asking the shader.
+    pub opaque: bool,
 }
 
 /// A placed mesh.
@@ -60,20 +68,30 @@ impl AccelerationStructures {
 
     fn build_mesh(&mut self, mesh: &MeshGeometry<'_>) -> GpuResult<()> {
         let vertices = Buffer::with_data(&self.gpu, "acceleration structure vertices", mesh.vertices, build_usage())?;
-        let indices = Buffer::with_data(&self.gpu, "acceleration structure indices", mesh.indices, build_usage())?;
+        let lists: GpuResult<Vec<Buffer>> = mesh
+            .parts
+            .iter()
+            .map(|part| Buffer::with_data(&self.gpu, "acceleration structure indices", &part.indices, build_usage()))
+            .collect();
+        let lists = lists?;
         let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
             .vertex_format(vk::Format::R32G32B32_SFLOAT)
             .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: vertices.device_address() })
             .vertex_stride(12)
             .max_vertex(u32::try_from(mesh.vertices.len()).unwrap_or(u32::MAX).saturating_sub(1))
-            .index_type(vk::IndexType::UINT32)
-            .index_data(vk::DeviceOrHostAddressConstKHR { device_address: indices.device_address() });
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
-            .flags(vk::GeometryFlagsKHR::OPAQUE)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { triangles });
-        let count = u32::try_from(mesh.indices.len()).unwrap_or(u32::MAX);
-        self.build_level(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, geometry, count)
+            .index_type(vk::IndexType::UINT32);
+        let geometry = |part: &MeshPart, indices: &Buffer| {
+            let address = vk::DeviceOrHostAddressConstKHR { device_address: indices.device_address() };
+            let triangles = triangles.index_data(address);
+            vk::AccelerationStructureGeometryKHR::default()
+                .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+                .flags(if part.opaque { vk::GeometryFlagsKHR::OPAQUE } else { vk::GeometryFlagsKHR::empty() })
+                .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        };
+        let geometries: Vec<_> = mesh.parts.iter().zip(&lists).map(|(part, list)| geometry(part, list)).collect();
+        let counts: Vec<u32> =
+            mesh.parts.iter().map(|part| u32::try_from(part.indices.len()).unwrap_or(u32::MAX)).collect();
+        self.build_level(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, &geometries, &counts)
     }
 
     fn build_top_level(&mut self, instances: &[InstanceGeometry]) -> GpuResult<()> {
@@ -87,7 +105,7 @@ impl AccelerationStructures {
             .geometry_type(vk::GeometryTypeKHR::INSTANCES)
             .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data });
         let count = u32::try_from(records.len()).unwrap_or(u32::MAX);
-        self.build_level(vk::AccelerationStructureTypeKHR::TOP_LEVEL, geometry, count)
+        self.build_level(vk::AccelerationStructureTypeKHR::TOP_LEVEL, &[geometry], &[count])
     }
 
     fn level_address(&self, level: vk::AccelerationStructureKHR) -> u64 {
@@ -99,27 +117,26 @@ impl AccelerationStructures {
     fn build_level(
         &mut self,
         level: vk::AccelerationStructureTypeKHR,
-        geometry: vk::AccelerationStructureGeometryKHR<'_>,
-        count: u32,
+        geometries: &[vk::AccelerationStructureGeometryKHR<'_>],
+        counts: &[u32],
     ) -> GpuResult<()> {
         let gpu = self.gpu.clone();
         let functions = gpu.acceleration.as_ref().ok_or_else(|| GpuError::Lacks {
             device: gpu.info.name.clone(),
             lacks: "was opened without ray queries".to_owned(),
         })?;
-        let geometries = [geometry];
         let mut info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
             .ty(level)
             .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
             .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
-            .geometries(&geometries);
+            .geometries(geometries);
         let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
         // SAFETY: the geometry is described completely and its buffers live until the wait below.
         unsafe {
             functions.get_acceleration_structure_build_sizes(
                 vk::AccelerationStructureBuildTypeKHR::DEVICE,
                 &info,
-                &[count],
+                counts,
                 &mut sizes,
             );
         }
@@ -147,11 +164,14 @@ impl AccelerationStructures {
         info.dst_acceleration_structure = structure;
         info.scratch_data =
             vk::DeviceOrHostAddressKHR { device_address: scratch.device_address().next_multiple_of(256) };
-        let range = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
+        let ranges: Vec<_> = counts
+            .iter()
+            .map(|&count| vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count))
+            .collect();
         let mut submission = Submission::new(&gpu, "building acceleration structures")?;
         submission.submit(&[Dispatch::Record(&|_, commands| {
             // SAFETY: all buffers live until the wait below.
-            unsafe { functions.cmd_build_acceleration_structures(commands, &[info], &[&range]) };
+            unsafe { functions.cmd_build_acceleration_structures(commands, &[info], &[&ranges]) };
         })])?;
         submission.wait()
     }

@@ -12,7 +12,7 @@ mod kernel;
 pub mod shader_compiler;
 mod submit;
 
-pub use acceleration_structure::{AccelerationStructures, InstanceGeometry, MeshGeometry};
+pub use acceleration_structure::{AccelerationStructures, InstanceGeometry, MeshGeometry, MeshPart};
 pub use buffer::{Buffer, MemoryUse};
 pub use device::{DeviceRequirements, Gpu};
 pub use enumerate::{DeviceInfo, DeviceKind, DeviceLimits, DeviceSelection, devices, select};

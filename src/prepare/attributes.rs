@@ -6,7 +6,8 @@ use super::coincident::SeenTriangles;
 use super::materials::{MaterialTable, MaterialUse};
 use super::{COORDINATE_LIMIT, PrepareError};
 use crate::layout::{
-    LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, SLOT_LEAF, TRIANGLE_NORMALS, TRIANGLE_TEXCOORDS, Triangle, Vertex,
+    LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, SLOT_ALPHA, SLOT_LEAF, TRIANGLE_NORMALS, TRIANGLE_TEXCOORDS, Triangle,
+    Vertex,
 };
 use crate::scene::Primitive;
 
@@ -40,7 +41,7 @@ pub(super) struct EmissiveTriangle {
 }
 
 /// Puts the triangles of a primitive, transformed, into `mesh`. Those without area have no normal and are left out, and so
-/// are emissive ones that are there already; a mirroring transform would turn the winding around, so two corners change
+/// are those whose alpha leaves nothing of them and emissive ones that are there already; a mirroring transform would turn the winding around, so two corners change
 /// places.
 pub(super) fn add_primitive(
     primitive: &Primitive,
@@ -50,6 +51,9 @@ pub(super) fn add_primitive(
     mesh: &mut MeshGeometry,
 ) -> Result<(), PrepareError> {
     let used = materials.used(primitive.material);
+    if used.absent {
+        return Ok(());
+    }
     let positions = transform_positions(primitive, transform)
         .ok_or_else(|| PrepareError::TooFar { name: mesh.name.clone(), limit: COORDINATE_LIMIT })?;
     let first_vertex = attributes.vertices.len() as u32;
@@ -60,6 +64,7 @@ pub(super) fn add_primitive(
     let mirrored = transform.matrix3.determinant() < 0.0;
     let map = materials.emission_map(used.record);
     let double_sided = materials.records[used.record as usize].kind_flags & MATERIAL_DOUBLE_SIDED != 0;
+    let kind = SLOT_LEAF | used.record | if used.alpha { SLOT_ALPHA } else { 0 };
     mesh.leaves.reserve(primitive.triangles.len());
     attributes.triangles.reserve(primitive.triangles.len());
     for &[a, b, c] in &primitive.triangles {
@@ -77,14 +82,14 @@ pub(super) fn add_primitive(
             let mean_luminance = match map {
                 Some(map) => map.mean(corners.map(|corner| texcoord(primitive, corner))),
                 None => super::luminance(materials.records[used.record as usize].emission),
-            };
+            } * materials.largest_opacity(used.record);
             if mean_luminance > 0.0 {
                 light = mesh.emissive.len() as u32;
                 mesh.emissive.push(EmissiveTriangle { vertices, material: used.record, mean_luminance, slot: NONE });
             }
         }
         let triangle = attributes.triangles.len() as u32;
-        mesh.leaves.push(LeafSlot { vertices, triangle, light, kind: SLOT_LEAF | used.record });
+        mesh.leaves.push(LeafSlot { vertices, triangle, light, kind });
         attributes.triangles.push(available.triangle(corners, first_vertex, &attributes.vertices));
     }
     Ok(())

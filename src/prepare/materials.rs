@@ -1,12 +1,14 @@
 //! The materials in use as the shader reads them, and the textures they need.
 
 use super::PrepareError;
+use super::alpha::Presence;
 use super::emission::EmissionMap;
 use super::features::Features;
 use super::textures::{ColorSpace, TextureTable};
 use crate::layout::{
-    BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_BLACK_BACK,
-    MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK, Material, NONE, SLOT_MATERIAL_MASK,
+    BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_ALPHA_BLEND,
+    MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK, Material,
+    NONE, SLOT_MATERIAL_MASK,
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding};
 
@@ -24,14 +26,24 @@ pub(super) struct MaterialTable {
 /// What geometry must know of its material.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MaterialUse {
-    /// Index of the record.
+    /// Index of the record; none of a surface that is nowhere there.
     pub record: u32,
+    /// Nothing of the surface is there.
+    pub absent: bool,
+    /// Traversal decides where it is there.
+    pub alpha: bool,
     /// Some texture is looked up.
     pub textured: bool,
     /// Shading normals matter.
     pub shaded: bool,
     /// It emits somewhere, and its triangles are lights.
     pub emissive: bool,
+}
+
+impl MaterialUse {
+    /// That of a surface that is nowhere there.
+    const ABSENT: Self =
+        Self { record: u32::MAX, absent: true, alpha: false, textured: false, shaded: false, emissive: false };
 }
 
 impl MaterialTable {
@@ -71,6 +83,12 @@ impl MaterialTable {
         self.records.iter().any(|record| record.kind_flags & MATERIAL_KIND_MASK == BSDF_METALLIC_ROUGHNESS)
     }
 
+    /// A bound on the share of a surface that is there, > 0, whatever its texture says. It weighs lights against each other.
+    pub(super) fn largest_opacity(&self, record: u32) -> f64 {
+        let record = &self.records[record as usize];
+        if record.kind_flags & MATERIAL_ALPHA_BLEND != 0 { record.alpha.into() } else { 1.0 }
+    }
+
     /// Adds what the materials need.
     pub(super) fn add_features(&self, features: &mut Features) {
         for record in &self.records {
@@ -80,6 +98,7 @@ impl MaterialTable {
             features.emission |= record.emission != [0.0; 3];
             features.transmission |= record.transmission > 0.0;
             features.specular |= has_specular(record);
+            features.alpha |= record.kind_flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0;
             features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
             features.schlick |= record.kind_flags & MATERIAL_SCHLICK != 0;
         }
@@ -91,6 +110,10 @@ impl MaterialTable {
         material: &scene::Material,
         textures: &mut TextureTable,
     ) -> Result<MaterialUse, PrepareError> {
+        let presence = Presence::of(scene, material);
+        if presence == Presence::Absent {
+            return Ok(MaterialUse::ABSENT);
+        }
         let index = self.records.len() as u32;
         if index > SLOT_MATERIAL_MASK {
             return Err(PrepareError::TooManyMaterials);
@@ -99,6 +122,7 @@ impl MaterialTable {
             Some(binding) if needed => textures.add(scene, binding.texture, space),
             _ => Ok(NONE),
         };
+        let alpha = presence != Presence::Opaque;
         let rough = material.bsdf == Bsdf::MetallicRoughness;
         // KHR_materials_unlit: emission is ignored.
         let may_emit = material.is_emissive() && material.bsdf != Bsdf::Unlit;
@@ -110,21 +134,25 @@ impl MaterialTable {
         let transmission = if rough { material.transmission } else { 0.0 };
         let record = Material {
             base_color: material.base_color,
-            kind_flags: kind_flags(material),
+            kind_flags: kind_flags(material, presence),
             emission: if emissive { material.emission } else { [0.0; 3] },
             roughness: material.roughness,
             metallic: material.metallic,
             ior: material.ior,
             transmission,
             alpha: material.alpha,
-            base_color_texture: bind(material.base_color_texture, material.base_color != [0.0; 3], ColorSpace::Srgb)?,
+            base_color_texture: bind(
+                material.base_color_texture,
+                alpha || material.base_color != [0.0; 3],
+                ColorSpace::Srgb,
+            )?,
             metallic_roughness_texture: bind(material.metallic_roughness_texture, rough, ColorSpace::Linear)?,
             emission_texture: bind(material.emission_texture, emissive, ColorSpace::Srgb)?,
             normal_texture: NONE,
             specular_color: material.specular_color,
             specular: material.specular,
             absorption: [0.0; 3],
-            alpha_cutoff: 0.0,
+            alpha_cutoff: if let Presence::Mask { cutoff } = presence { cutoff } else { 0.0 },
             anisotropy: material.anisotropy,
             anisotropy_turns: material.anisotropy_rotation_radians / std::f32::consts::TAU,
             normal_scale: material.normal_scale,
@@ -141,7 +169,14 @@ impl MaterialTable {
         let textured = textures_of(&record).iter().any(|&texture| texture != NONE);
         self.records.push(record);
         self.emission_maps.push(map.filter(|_| emissive));
-        Ok(MaterialUse { record: index, textured, shaded: material.bsdf != Bsdf::Unlit, emissive })
+        Ok(MaterialUse {
+            record: index,
+            absent: false,
+            alpha,
+            textured,
+            shaded: material.bsdf != Bsdf::Unlit,
+            emissive,
+        })
     }
 }
 
@@ -167,7 +202,7 @@ fn textures_of(record: &Material) -> [u32; 8] {
     ]
 }
 
-fn kind_flags(material: &scene::Material) -> u32 {
+fn kind_flags(material: &scene::Material, presence: Presence) -> u32 {
     let mut bits = match material.bsdf {
         Bsdf::Lambertian => BSDF_LAMBERTIAN,
         Bsdf::Mirror => BSDF_MIRROR,
@@ -185,5 +220,9 @@ fn kind_flags(material: &scene::Material) -> u32 {
     if material.bsdf == Bsdf::Glass && material.fresnel == Fresnel::Schlick {
         bits |= MATERIAL_SCHLICK;
     }
-    bits
+    match presence {
+        Presence::Mask { .. } => bits | MATERIAL_ALPHA_MASK,
+        Presence::Blend => bits | MATERIAL_ALPHA_BLEND,
+        Presence::Opaque | Presence::Absent => bits,
+    }
 }

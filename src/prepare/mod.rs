@@ -2,6 +2,7 @@
 //! lights and the distributions by which they are picked, and what of the kernel the scene needs.
 
 mod acceleration;
+mod alpha;
 mod attributes;
 pub mod bounds;
 pub mod bvh;

@@ -7,9 +7,9 @@ use ash::vk::BufferUsageFlags as Usage;
 
 use crate::gpu::{
     AccelerationStructures, ArrayForm, BindingResource, Buffer, DeviceInfo, DeviceKind, Gpu, GpuError, GpuResult,
-    InstanceGeometry, MeshGeometry, TraceBackend,
+    InstanceGeometry, MeshGeometry, MeshPart, TraceBackend,
 };
-use crate::layout::{MAX_CHUNKS, SCENE_ARRAYS, SceneArray, Texel};
+use crate::layout::{MAX_CHUNKS, SCENE_ARRAYS, SLOT_ALPHA, SceneArray, Texel};
 use crate::prepare::Prepared;
 
 /// Custom index of the baked mesh, as in shaders/include/trace_ray_query.glsl.
@@ -127,7 +127,8 @@ fn upload_addresses(gpu: &Arc<Gpu>, chunks: &[Vec<Buffer>]) -> GpuResult<Buffer>
 }
 
 /// Every mesh over all of its slots, so that primitive i is slot first + i; slots that are no triangles become degenerate
-/// ones.
+/// ones. Where some triangles have alpha there is a second list, in which they stand and the opaque ones are degenerate:
+/// so only they ask the shader.
 fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<AccelerationStructures> {
     let slots = &prepared.arrays[SceneArray::Slots as usize];
     let mut geometry = Vec::new();
@@ -135,14 +136,20 @@ fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<Accelera
         let texels: &[Texel] = &slots[3 * mesh.slots.start as usize..3 * mesh.slots.end as usize];
         let words: &[u32] = bytemuck::cast_slice(texels);
         let vertices: Vec<[f32; 3]> = words.chunks_exact(3).map(|v| [v[0], v[1], v[2]].map(f32::from_bits)).collect();
-        let mut indices = vec![[0_u32; 3]; texels.len() / 3];
+        let part = |opaque| MeshPart { indices: vec![[0_u32; 3]; texels.len() / 3], opaque };
+        let (mut opaque, mut alpha) = (part(true), None);
+        let mut is_triangle = vec![false; texels.len() / 3];
         for slot in prepared.triangle_slots(mesh) {
             let i = slot - mesh.slots.start;
-            indices[i as usize] = [4 * i, 4 * i + 1, 4 * i + 2];
+            let has_alpha = texels[3 * i as usize + 2][3] & SLOT_ALPHA != 0;
+            let list = if has_alpha { alpha.get_or_insert_with(|| part(false)) } else { &mut opaque };
+            list.indices[i as usize] = [4 * i, 4 * i + 1, 4 * i + 2];
+            is_triangle[i as usize] = true;
         }
-        geometry.push((keep_finite(vertices, &indices), indices));
+        let parts: Vec<MeshPart> = [Some(opaque), alpha].into_iter().flatten().collect();
+        geometry.push((keep_finite(vertices, &is_triangle), parts));
     }
-    let meshes: Vec<_> = geometry.iter().map(|(vertices, indices)| MeshGeometry { vertices, indices }).collect();
+    let meshes: Vec<_> = geometry.iter().map(|(vertices, parts)| MeshGeometry { vertices, parts }).collect();
     let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
     let mut instances = vec![InstanceGeometry { mesh: 0, transform: identity, custom_index: BAKED_INSTANCE }];
     instances.extend(prepared.instances.iter().zip(0..).map(|(instance, custom_index)| InstanceGeometry {
@@ -154,9 +161,9 @@ fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<Accelera
 }
 
 /// Words of inner slots read as floats can be NaN; only triangles' vertices matter.
-fn keep_finite(mut vertices: Vec<[f32; 3]>, indices: &[[u32; 3]]) -> Vec<[f32; 3]> {
-    for (quad, triangle) in vertices.chunks_exact_mut(4).zip(indices) {
-        if *triangle == [0; 3] {
+fn keep_finite(mut vertices: Vec<[f32; 3]>, is_triangle: &[bool]) -> Vec<[f32; 3]> {
+    for (quad, &is_triangle) in vertices.chunks_exact_mut(4).zip(is_triangle) {
+        if !is_triangle {
             quad.fill([0.0; 3]);
         }
         quad[3] = [0.0; 3];

@@ -34,7 +34,7 @@ fn bits(film: &Film) -> Vec<[u64; 4]> {
 
 #[test]
 fn slices_workgroups_and_budgets_do_not_change_a_bit() {
-    for name in some(&["instances", "cornell_spheres"]) {
+    for name in some(&["instances", "cornell_spheres", "alpha"]) {
         let reference = film(name, &settings(), BindingOverride::default(), 0..40);
         for (slice_lanes, workgroup_size, ray_budget) in
             [(None, None, None), (Some(1000), Some(32), None), (Some(4096), Some(128), Some(3)), (None, None, Some(50))]

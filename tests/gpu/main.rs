@@ -4,6 +4,7 @@
 mod common;
 
 mod agreement;
+mod alpha;
 mod bsdf_chi_square;
 mod bsdf_delta;
 mod cornell;

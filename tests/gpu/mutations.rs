@@ -75,6 +75,22 @@ mutations! {
     roulette_without_compensation: "path_trace.comp",
         "lane.throughput /= survival;" => "",
         caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
+    /// The shadow ray passes a sheet wherever the path's ray did.
+    shared_alpha_decisions: "include/alpha.glsl",
+        "shadow ? bits.zw : bits.xy" => "bits.xy",
+        caught by "alpha::shadow_rays_pass_as_path_rays_do";
+    /// All instances of a sheet are there, or none.
+    instances_share_alpha: "include/alpha.glsl",
+        "pcg4d(uvec4(key, triangle, instance)).x" => "pcg4d(uvec4(key, triangle, 0u)).x",
+        caught by "alpha::sheets_mix_with_the_background";
+    /// What is not there of a lamp shines when it is sampled.
+    lamp_without_alpha: "include/light.glsl",
+        "emission *= surface_opacity" => "vec3(1.0) * surface_opacity",
+        caught by "alpha::a_lamp_that_is_partly_there_gives_its_share";
+    /// A mask by the wrong half.
+    mask_turned_around: "include/alpha.glsl",
+        "alpha >= material.alpha_cutoff" => "alpha < material.alpha_cutoff",
+        caught by "alpha::a_mask_is_the_geometry_cut_out";
     /// Emission met by chance is weighted as if its lamp were the only one.
     pick_left_out: "include/light.glsl",
         "return light_pick_probability(constants, light) / point.area" => "return 1.0 / point.area",

@@ -99,7 +99,7 @@ fn back_ends_draw_the_same_image() {
     if gpu::device().trace != TraceBackend::RayQuery {
         return;
     }
-    for name in ["instances", "metallic_roughness", "cornell"] {
+    for name in ["instances", "alpha", "metallic_roughness", "cornell"] {
         let scene = scene(name);
         let settings = Settings { max_bounces: Some(3), ..gpu::settings(64, 64) };
         let draw = |trace| {

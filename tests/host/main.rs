@@ -9,6 +9,7 @@ mod film_images;
 mod film_metrics;
 mod film_sums;
 mod ggx_albedo;
+mod prepare_alpha;
 mod prepare_bvh;
 mod prepare_environment;
 mod prepare_geometry;

@@ -5,7 +5,7 @@ use glam::DVec3;
 use serde_json::{Value, json};
 use sunfleck::scene::load::{load_scene, resolve};
 use sunfleck::scene::{
-    Bsdf, Environment, Filter, Fresnel, Primitive, Projection, PunctualKind, Scene, Texels, Wrap, builtin,
+    AlphaMode, Bsdf, Environment, Filter, Fresnel, Primitive, Projection, PunctualKind, Scene, Texels, Wrap, builtin,
 };
 
 fn primitive(scene: &Scene) -> &Primitive {
@@ -328,7 +328,7 @@ fn what_is_not_used_is_not_read() {
 
 #[test]
 fn each_missing_feature_is_one_warning() {
-    let material = json!({"normalTexture": {"index": 0}, "occlusionTexture": {"index": 0}, "alphaMode": "BLEND",
+    let material = json!({"normalTexture": {"index": 0}, "occlusionTexture": {"index": 0}, "alphaMode": "DITHER",
         "extensions": {"KHR_materials_clearcoat": {}, "KHR_materials_transmission": {"transmissionFactor": 1},
                        "KHR_materials_volume": {}}});
     let part = |material: u32| json!({"attributes": {"POSITION": 0, "COLOR_0": 0}, "indices": 1, "material": material, "targets": [{}]});
@@ -341,7 +341,7 @@ fn each_missing_feature_is_one_warning() {
     ]));
     let subjects = [
         "normal textures",
-        "alphaMode BLEND",
+        "alphaMode DITHER",
         "KHR_materials_clearcoat",
         "KHR_materials_volume",
         "COLOR_0",
@@ -358,6 +358,30 @@ fn each_missing_feature_is_one_warning() {
     let normals = scene.warnings.iter().find(|warning| warning.contains("normal textures")).expect("it is there");
     assert!(normals.contains("2 times"), "{normals}");
     assert_eq!((scene.materials[0].bsdf, scene.materials[0].transmission), (Bsdf::MetallicRoughness, 1.0));
+}
+
+#[test]
+fn alpha_modes_with_their_cutoffs() {
+    let alpha = |material: Value| {
+        let scene = load_ok(&triangle_with(&[
+            ("/materials", json!([material])),
+            ("/meshes/0/primitives/0/material", json!(0)),
+        ]));
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        (scene.materials[0].alpha_mode, scene.materials[0].alpha)
+    };
+    let faded = json!({"baseColorFactor": [0, 0, 0, 0.25]});
+    let mask = |cutoff| AlphaMode::Mask { cutoff };
+    assert_eq!(alpha(json!({})), (AlphaMode::Opaque, 1.0));
+    assert_eq!(alpha(json!({"pbrMetallicRoughness": faded})), (AlphaMode::Opaque, 0.25));
+    assert_eq!(alpha(json!({"pbrMetallicRoughness": faded, "alphaMode": "BLEND"})), (AlphaMode::Blend, 0.25));
+    assert_eq!(alpha(json!({"alphaMode": "MASK"})), (mask(0.5), 1.0));
+    assert_eq!(alpha(json!({"alphaMode": "MASK", "alphaCutoff": 1.5})), (mask(1.5), 1.0));
+    // The cutoff of another mode means nothing.
+    assert_eq!(alpha(json!({"alphaMode": "BLEND", "alphaCutoff": 0.1})), (AlphaMode::Blend, 1.0));
+    let negative = json!([{"alphaMode": "MASK", "alphaCutoff": -0.5}]);
+    let document = triangle_with(&[("/materials", negative), ("/meshes/0/primitives/0/material", json!(0))]);
+    assert!(load_error(&document).to_string().contains("/materials/0/alphaCutoff"));
 }
 
 #[test]

@@ -6,7 +6,7 @@
 
 use super::Loader;
 use super::json::Json;
-use crate::scene::{Bsdf, Fresnel, Material, SceneResult, TextureBinding};
+use crate::scene::{AlphaMode, Bsdf, Fresnel, Material, SceneResult, TextureBinding};
 
 impl Loader<'_> {
     /// The index in `Scene::materials` of a glTF material, or of the default one. Where a primitive has no texture
@@ -43,6 +43,7 @@ impl Loader<'_> {
             material.bsdf = Bsdf::Unlit;
         }
         read_extras(place, &mut material)?;
+        material.alpha_mode = self.alpha_mode(place)?;
         if let Some(pbr) = place.get("pbrMetallicRoughness")? {
             self.read_metallic_roughness(&pbr, &mut material, has_texcoords)?;
         }
@@ -57,6 +58,24 @@ impl Loader<'_> {
         Ok(material)
     }
 
+    /// What the base colour's alpha means. A cutoff above 1 leaves nothing.
+    fn alpha_mode(&mut self, place: &Json<'_>) -> SceneResult<AlphaMode> {
+        let Some(mode) = place.get("alphaMode")? else { return Ok(AlphaMode::Opaque) };
+        match mode.string()? {
+            "OPAQUE" => Ok(AlphaMode::Opaque),
+            "BLEND" => Ok(AlphaMode::Blend),
+            "MASK" => {
+                let cutoff = place.number_in("alphaCutoff", 0.5, 0.0, f64::from(f32::MAX))?;
+                Ok(AlphaMode::Mask { cutoff: cutoff as f32 })
+            }
+            other => {
+                let subject = format!("alphaMode {other} is none of OPAQUE, MASK and BLEND: the surface is opaque");
+                self.warnings.add(subject, &mode.pointer);
+                Ok(AlphaMode::Opaque)
+            }
+        }
+    }
+
     fn read_metallic_roughness(
         &mut self,
         pbr: &Json<'_>,
@@ -67,10 +86,11 @@ impl Loader<'_> {
             for component in place.elements()? {
                 component.number_within(0.0, 1.0)?;
             }
-            let [r, g, b, _] = place.numbers::<4>()?;
+            let [r, g, b, alpha] = place.numbers::<4>()?;
             material.base_color = [r, g, b].map(|c| c as f32);
+            material.alpha = alpha as f32;
         }
-        if material.base_color != [0.0; 3] {
+        if material.base_color != [0.0; 3] || material.alpha_mode != AlphaMode::Opaque {
             material.base_color_texture = self.texture(pbr.get("baseColorTexture")?, has_texcoords)?;
         }
         if material.bsdf == Bsdf::MetallicRoughness {
@@ -142,11 +162,6 @@ impl Loader<'_> {
     fn warn_of_material(&mut self, place: &Json<'_>, material: &Material) -> SceneResult<()> {
         if material.bsdf != Bsdf::Unlit && place.get("normalTexture")?.is_some() {
             let subject = "normal textures are not supported yet: the interpolated normal is used";
-            self.warnings.add(subject, &place.pointer);
-        }
-        let alpha_mode = place.get("alphaMode")?.map_or(Ok("OPAQUE"), |mode| mode.string())?;
-        if alpha_mode != "OPAQUE" {
-            let subject = format!("alphaMode {alpha_mode} is not supported yet: the surface is opaque");
             self.warnings.add(subject, &place.pointer);
         }
         let volume_was_named = self.warnings.has("KHR_materials_volume ");

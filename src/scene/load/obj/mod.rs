@@ -14,6 +14,7 @@ mod convert;
 mod material;
 mod parse;
 mod polygon;
+mod textures;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -21,9 +22,9 @@ use std::path::{Path, PathBuf};
 use glam::DAffine3;
 use rayon::prelude::*;
 
-use self::convert::Textures;
 use self::material::MtlMaterial;
 use self::parse::{Corner, Face, Geometry};
+use self::textures::Textures;
 use super::file;
 use super::warnings::Warnings;
 use crate::scene::{Instance, Material, Mesh, Primitive, Scene, SceneError, SceneResult};
@@ -44,7 +45,7 @@ pub(super) fn load(path: &Path) -> SceneResult<Scene> {
             Some(&known) => known,
             None => {
                 let name = part.material.map(|index| geometry.material_names[index as usize].as_str());
-                scene.materials.push(convert_material(name, &library, path, &mut textures, &mut warnings)?);
+                scene.materials.push(convert_material(name, &library, path, &mut textures, &mut warnings));
                 materials.insert(part.material, scene.materials.len() - 1);
                 scene.materials.len() - 1
             }
@@ -62,8 +63,9 @@ pub(super) fn load(path: &Path) -> SceneResult<Scene> {
     }
     let (textures, pending) = textures.into_parts();
     scene.textures = textures;
-    let images: Vec<SceneResult<_>> = pending.into_par_iter().map(convert::decode).collect();
+    let images: Vec<SceneResult<_>> = pending.par_iter().map(textures::decode).collect();
     scene.images = images.into_iter().collect::<SceneResult<_>>()?;
+    textures::drop_heights(&mut scene, &pending, &mut warnings);
     scene.warnings = warnings.into_lines();
     Ok(scene)
 }
@@ -125,15 +127,15 @@ fn convert_material(
     obj: &Path,
     textures: &mut Textures,
     warnings: &mut Warnings,
-) -> SceneResult<Material> {
+) -> Material {
     const DEFAULT_ALBEDO: [f32; 3] = [0.8; 3];
-    let Some(name) = name else { return Ok(Material::lambertian("default", DEFAULT_ALBEDO)) };
+    let Some(name) = name else { return Material::lambertian("default", DEFAULT_ALBEDO) };
     match library.get(name) {
         Some(material) => convert::convert(name, material, textures, warnings),
         None => {
             let subject = format!("material \"{name}\" is in no material library: a Lambertian of 0.8 stands for it");
             warnings.add(subject, obj.display().to_string());
-            Ok(Material::lambertian(name, DEFAULT_ALBEDO))
+            Material::lambertian(name, DEFAULT_ALBEDO)
         }
     }
 }
