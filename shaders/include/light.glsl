@@ -1,6 +1,7 @@
 // Sampling of lights: one is picked by the CDF over their power, then a point or direction of it.
 #ifndef LIGHT_GLSL
 #define LIGHT_GLSL
+#include "attributes.glsl"
 #include "cdf.glsl"
 #include "environment.glsl"
 #include "geometry.glsl"
@@ -41,10 +42,11 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     float cosine = -dot(direction, point.geometric_normal);
     Material material = load_material(constants, vertices.material);
     if (cosine == 0.0 || !emits_to_side(material, cosine > 0.0)) return NO_LIGHT;
-    vec2 uv = HAS_TEXTURES ? interpolate_vertices(constants, vertices.triangle, light.instance, barycentric).texcoord
-                           : vec2(0.0);
+    vec4 texcoords = vec4(0.0);
+    if (HAS_TEXTURES)
+        texcoords = interpolate_vertices(constants, vertices.triangle, light.instance, barycentric).texcoords;
     float pdf = pick / point.area * (distance * distance) / abs(cosine);
-    return LightSample(direction, distance, material_emission(constants, material, uv) / pdf, pdf,
+    return LightSample(direction, distance, material_emission(constants, material, texcoords) / pdf, pdf,
                        TriangleId(light.slot, light.instance));
 }
 

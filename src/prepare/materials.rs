@@ -6,7 +6,7 @@ use super::features::Features;
 use super::textures::{ColorSpace, TextureTable};
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_BLACK_BACK,
-    MATERIAL_DOUBLE_SIDED, MATERIAL_SCHLICK, Material, NONE, SLOT_MATERIAL_MASK,
+    MATERIAL_DOUBLE_SIDED, MATERIAL_SCHLICK, Material, NONE, SLOT_MATERIAL_MASK, TEXTURE_SET_1,
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding};
 
@@ -26,8 +26,10 @@ pub(super) struct MaterialTable {
 pub(super) struct MaterialUse {
     /// Index of the record.
     pub record: u32,
-    /// Some texture is looked up.
-    pub textured: bool,
+    /// Which sets of texture coordinates are looked up.
+    pub texcoord_sets: [bool; 2],
+    /// Tangents matter.
+    pub tangents: bool,
     /// Shading normals matter.
     pub shaded: bool,
     /// It emits somewhere, and its triangles are lights.
@@ -73,6 +75,7 @@ impl MaterialTable {
             features.textures |= textures_of(record).iter().any(|&texture| texture != NONE);
             features.emission_textures |= record.emission_texture != NONE;
             features.emission |= record.emission != [0.0; 3];
+            features.normal_maps |= record.normal_texture != NONE;
             features.transmission |= record.transmission > 0.0;
             features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
             features.schlick |= record.kind_flags & MATERIAL_SCHLICK != 0;
@@ -90,14 +93,15 @@ impl MaterialTable {
             return Err(PrepareError::TooManyMaterials);
         }
         let mut bind = |binding: Option<TextureBinding>, needed: bool, space: ColorSpace| match binding {
-            Some(binding) if needed => textures.add(scene, binding.texture, space),
+            Some(binding) if needed => textures.add(scene, binding, space),
             _ => Ok(NONE),
         };
+        let shaded = material.bsdf != Bsdf::Unlit;
         let rough = material.bsdf == Bsdf::MetallicRoughness;
         // KHR_materials_unlit: emission is ignored.
         let may_emit = material.is_emissive() && material.bsdf != Bsdf::Unlit;
         let map = match material.emission_texture {
-            Some(binding) if may_emit => Some(EmissionMap::new(scene, binding.texture, material.emission)),
+            Some(binding) if may_emit => Some(EmissionMap::new(scene, binding, material.emission)),
             _ => None,
         };
         let emissive = may_emit && !map.as_ref().is_some_and(EmissionMap::is_black);
@@ -114,7 +118,7 @@ impl MaterialTable {
             base_color_texture: bind(material.base_color_texture, material.base_color != [0.0; 3], ColorSpace::Srgb)?,
             metallic_roughness_texture: bind(material.metallic_roughness_texture, rough, ColorSpace::Linear)?,
             emission_texture: bind(material.emission_texture, emissive, ColorSpace::Srgb)?,
-            normal_texture: NONE,
+            normal_texture: bind(material.normal_texture, shaded && material.normal_scale != 0.0, ColorSpace::Linear)?,
             specular_color: material.specular_color,
             specular: material.specular,
             absorption: [0.0; 3],
@@ -132,10 +136,15 @@ impl MaterialTable {
                 ColorSpace::Linear,
             )?,
         };
-        let textured = textures_of(&record).iter().any(|&texture| texture != NONE);
+        let mut texcoord_sets = [false; 2];
+        for texture in textures_of(&record).into_iter().filter(|&texture| texture != NONE) {
+            let second = textures.headers[texture as usize].sampling & TEXTURE_SET_1 != 0;
+            texcoord_sets[usize::from(second)] = true;
+        }
+        let tangents = record.normal_texture != NONE || rough && material.anisotropy > 0.0;
         self.records.push(record);
         self.emission_maps.push(map.filter(|_| emissive));
-        Ok(MaterialUse { record: index, textured, shaded: material.bsdf != Bsdf::Unlit, emissive })
+        Ok(MaterialUse { record: index, texcoord_sets, tangents, shaded, emissive })
     }
 }
 

@@ -4,6 +4,7 @@
 mod common;
 
 mod agreement;
+mod attributes;
 mod bsdf_chi_square;
 mod bsdf_delta;
 mod cornell;
@@ -17,6 +18,7 @@ mod mutations;
 mod sampler;
 mod shader_math;
 mod shaders_valid;
+mod shading_normals;
 mod texture;
 mod trace;
 mod watertight;

@@ -32,7 +32,7 @@ impl Textures {
     fn bind(&mut self, texture: &MtlTexture) -> TextureBinding {
         let key = (texture.file.clone(), texture.wrap == Wrap::Repeat);
         if let Some(&texture) = self.known.get(&key) {
-            return TextureBinding { texture };
+            return TextureBinding::new(texture);
         }
         let image = *self.images.entry(texture.file.clone()).or_insert_with(|| {
             self.pending.push(texture.clone());
@@ -40,7 +40,7 @@ impl Textures {
         });
         self.textures.push(Texture { image, wrap_u: texture.wrap, wrap_v: texture.wrap, filter: Filter::Linear });
         self.known.insert(key, self.textures.len() - 1);
-        TextureBinding { texture: self.textures.len() - 1 }
+        TextureBinding::new(self.textures.len() - 1)
     }
 
     /// The textures, and the images they index, to be decoded in this order.
