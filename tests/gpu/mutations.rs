@@ -94,7 +94,7 @@ mutations! {
         caught by "shading_normals::a_coarse_sphere_has_a_smooth_terminator";
     /// A mirrored instance whose bitangent is not.
     unmirrored_bitangent: "include/attributes.glsl",
-        "bitangent_sign = -bitangent_sign;" => "",
+        "bitangent_sign = -bitangent_sign;" => "bitangent_sign = bitangent_sign;",
         caught by "attributes::attributes_go_with_their_instance";
 }
 
