@@ -84,29 +84,26 @@ bool sample_direct_light(inout LaneState lane, Surface surface, vec3 wo, Triangl
     uvec4 bits = sample_bits(key, lane.bounce, DIMENSIONS_LIGHT);
     uvec4 environment_bits = uvec4(0u);
     if (HAS_LIGHT(LIGHT_ENVIRONMENT)) environment_bits = sample_bits(key, lane.bounce, DIMENSIONS_ENVIRONMENT);
-    // The side of wo alone, where every continuous lobe reflects; else the side is known once the light is.
-    vec3 origin = offset_origin(surface.point, surface.side_normal);
+    // Above the surface, unless light can come through: then its side is known once the light is.
+    vec3 origin = scattered_origin(surface, false);
     LightSample light = sample_light(constants, origin, bits.xyz, environment_bits);
-    vec3 wi = to_local(surface.frame, light.direction);
     if (max_component(light.radiance) <= 0.0) return false;
-    bool through = bsdf_transmits(surface.bsdf) && wi.y < 0.0;
-    // Through the shading frame but not through the surface, or the other way round: no light.
-    if (through ? dot(light.direction, surface.side_normal) >= 0.0
-                : wi.y <= 0.0 || dot(light.direction, surface.side_normal) <= 0.0)
-        return false;
-    if (through) origin = offset_origin(surface.point, light.direction);
+    bool through = bsdf_transmits(surface.bsdf) && dot(light.direction, surface.side_normal) < 0.0;
+    if (!through && dot(light.direction, surface.horizon) <= 0.0) return false;
+    if (through) origin = scattered_origin(surface, true);
+    Scattering scattering = surface_scattering(surface, wo, light.direction, through);
     float weight = 1.0;
     if (light.pdf > 0.0) {
         if (LIGHT_SAMPLING == LIGHT_SAMPLING_BSDF) return false;
         // Mixture: half of the samples leave the light to the BSDF.
         if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE && bits.w >= 0x80000000u) return false;
-        float bsdf_density = bsdf_pdf(surface.bsdf, wo, wi);
-        if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE) weight = mixture_weight(light.pdf, bsdf_density);
-        if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIS) weight = mis_weight(light.pdf, bsdf_density);
+        if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIXTURE) weight = mixture_weight(light.pdf, scattering.pdf);
+        if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIS) weight = mis_weight(light.pdf, scattering.pdf);
     }
-    lane.shadow_light = lane.throughput * bsdf_evaluate(surface.bsdf, wo, wi) * (abs(wi.y) * weight) * light.radiance;
+    lane.shadow_light = lane.throughput * scattering.value * weight * light.radiance;
     if (max_component(lane.shadow_light) <= 0.0) return false;
-    lane.ray = Ray(origin, light.direction, light.distance, true, triangle, light.triangle);
+    TriangleId from = scattered_from(surface, triangle, light.direction, through);
+    lane.ray = Ray(origin, light.direction, light.distance, true, from, light.triangle);
     return true;
 }
 
@@ -137,19 +134,16 @@ bool survives_roulette(inout LaneState lane, float u) {
 // Draws the next direction and stores its ray; false if the path ends here.
 bool scatter(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle) {
     vec4 u = to_unit(sample_bits(sample_key(lane), lane.bounce, DIMENSIONS_SCATTER));
-    BsdfSample scattered = bsdf_scatter(surface.bsdf, wo, u.xyz);
-    vec3 direction = to_world(surface.frame, scattered.wi);
+    BsdfSample scattered = surface_scatter(surface, wo, u.xyz);
     bool through = (scattered.flags & SCATTERED_THROUGH) != 0u;
-    // Through the shading frame but not through the surface, or the other way round: absorbed.
-    if (through == dot(direction, surface.side_normal) > 0.0) return false;
     lane.throughput *= scattered.weight;
     if (through) lane.radiance_scale *= surface.bsdf.eta * surface.bsdf.eta;
     if (max_component(lane.throughput) == 0.0 || !survives_roulette(lane, u.w)) return false;
     lane.emission_weight = scattered_emission_weight(lane, scattered);
     lane.pdf = scattered.pdf;
-    lane.next_origin = offset_origin(surface.point, direction);
-    lane.next_direction = safe_normalize(direction);
-    lane.next_from = triangle;
+    lane.next_origin = scattered_origin(surface, through);
+    lane.next_direction = safe_normalize(scattered.wi);
+    lane.next_from = scattered_from(surface, triangle, scattered.wi, through);
     return true;
 }
 

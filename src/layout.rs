@@ -100,6 +100,10 @@ pub const SLOT_TEXELS: u32 = 3;
 pub const TRIANGLE_NORMALS: u32 = 1;
 /// The triangle's vertices carry texture coordinates.
 pub const TRIANGLE_TEXCOORDS: u32 = 2;
+/// The triangle's vertices carry tangents.
+pub const TRIANGLE_TANGENTS: u32 = 4;
+/// The triangle's vertices carry colours.
+pub const TRIANGLE_COLORS: u32 = 8;
 
 /// What shading needs of a triangle beyond its positions.
 #[repr(C)]
@@ -107,26 +111,35 @@ pub const TRIANGLE_TEXCOORDS: u32 = 2;
 pub struct Triangle {
     /// Indices of [`Vertex`] records.
     pub vertices: [u32; 3],
-    /// [`TRIANGLE_NORMALS`], [`TRIANGLE_TEXCOORDS`].
+    /// `TRIANGLE_*` bits.
     pub flags: u32,
 }
 
-/// Shading attributes of a vertex, in the space of its mesh (world for baked meshes).
+/// Shading attributes of a vertex, in the space of its mesh (world for baked meshes). A scene stores of each vertex
+/// [`RenderConstants::vertex_texels`] texels: the first; the second where it has texture coordinates or tangents; the third
+/// where it has tangents; and as the last the colour where it has colours.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Vertex {
     /// Unit shading normal.
     pub normal: [f32; 3],
-    /// Texture coordinate u.
+    /// Texture coordinate u of set 0.
     pub u: f32,
-    /// Texture coordinate v.
+    /// Texture coordinate v of set 0.
     pub v: f32,
+    /// Texture coordinate u of set 1.
+    pub u_1: f32,
+    /// Texture coordinate v of set 1.
+    pub v_1: f32,
     /// Unused, zero.
-    pub unused: [f32; 3],
+    pub unused: f32,
+    /// Unit tangent, or zero.
+    pub tangent: [f32; 3],
+    /// The bitangent is this sign, 1 or −1, times normal × tangent.
+    pub bitangent_sign: f32,
+    /// Linear colour and alpha, in [0, 1].
+    pub color: [f32; 4],
 }
-
-/// Texels a vertex takes.
-pub const VERTEX_TEXELS: u32 = 2;
 
 /// [`Material`] `kind`: Lambertian.
 pub const BSDF_LAMBERTIAN: u32 = 0;
@@ -223,12 +236,16 @@ pub const TEXTURE_SRGB: u32 = 1;
 pub const TEXTURE_16_BIT: u32 = 2;
 /// `sampling`: nearest texel instead of bilinear.
 pub const TEXTURE_NEAREST: u32 = 4;
+/// `sampling`: looked up by the second set of texture coordinates.
+pub const TEXTURE_SET_1: u32 = 8;
 /// `sampling`: shift of the wrap mode along u; 0 repeat, 1 mirrored repeat, 2 clamp to edge.
 pub const TEXTURE_WRAP_U_SHIFT: u32 = 4;
 /// `sampling`: shift of the wrap mode along v.
 pub const TEXTURE_WRAP_V_SHIFT: u32 = 6;
+/// `sampling`: the transform is not the identity.
+pub const TEXTURE_TRANSFORMED: u32 = 1 << 8;
 
-/// Where a texture's texels are and how they are read.
+/// Where a texture's texels are, by which coordinates and how they are read.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TextureHeader {
@@ -240,7 +257,18 @@ pub struct TextureHeader {
     pub height: u32,
     /// `TEXTURE_*` bits.
     pub sampling: u32,
+    /// u′ of the lookup is the dot product with (u, v, 1).
+    pub u_row: [f32; 3],
+    /// Unused, zero.
+    pub unused: u32,
+    /// v′ of the lookup is the dot product with (u, v, 1).
+    pub v_row: [f32; 3],
+    /// Unused, zero.
+    pub unused_too: u32,
 }
+
+/// Texels a texture header takes.
+pub const TEXTURE_TEXELS: u32 = 3;
 
 /// [`Light`] `kind`: emissive triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
@@ -327,8 +355,8 @@ pub struct RenderConstants {
     pub projection: u32,
     /// Unit viewing direction.
     pub camera_forward: [f32; 3],
-    /// Unused, zero.
-    pub unused: f32,
+    /// Texels of a [`Vertex`].
+    pub vertex_texels: u32,
     /// Film width in pixels.
     pub width: u32,
     /// Film height in pixels.

@@ -1,4 +1,4 @@
-// The surface at a hit: position with a bound on its error, normals, texture coordinates, material.
+// The point of a triangle: position with a bound on its error, geometric normal, and where rays leave from it.
 #ifndef GEOMETRY_GLSL
 #define GEOMETRY_GLSL
 #include "features.glsl"
@@ -75,38 +75,6 @@ vec3 offset_origin(SurfacePoint point, vec3 direction) {
     return vec3(offset.x > 0.0 ? next_float_up(p.x) : (offset.x < 0.0 ? next_float_down(p.x) : p.x),
                 offset.y > 0.0 ? next_float_up(p.y) : (offset.y < 0.0 ? next_float_down(p.y) : p.y),
                 offset.z > 0.0 ? next_float_up(p.z) : (offset.z < 0.0 ? next_float_down(p.z) : p.z));
-}
-
-struct Vertices {
-    vec3 normal;    // interpolated unit shading normal in world space; zero if the triangle is flat
-    vec2 texcoord;  // interpolated; zero if there are none
-};
-
-Vertices interpolate_vertices(RenderConstants constants, uint triangle, uint instance, vec2 barycentric) {
-    Vertices result = Vertices(vec3(0.0), vec2(0.0));
-    if (!HAS_NORMALS && !HAS_TEXTURES) return result;
-    uvec4 record = LOAD4(ATTRIBUTES, triangle);
-    if (record.w == 0u) return result;
-    vec3 weights = vec3(1.0 - barycentric.x - barycentric.y, barycentric);
-    uvec3 first = constants.vertices + record.xyz * VERTEX_TEXELS;
-    vec4 a = uintBitsToFloat(LOAD4(ATTRIBUTES, first.x));
-    vec4 b = uintBitsToFloat(LOAD4(ATTRIBUTES, first.y));
-    vec4 c = uintBitsToFloat(LOAD4(ATTRIBUTES, first.z));
-    vec4 mixed = a * weights.x + b * weights.y + c * weights.z;
-    if (HAS_NORMALS && (record.w & TRIANGLE_NORMALS) != 0u) {
-        vec3 normal = mixed.xyz;
-        if (HAS_INSTANCES && instance != NONE)
-            normal = transform_transposed(load_world_to_object(constants, instance), normal);
-        // Opposite vertex normals can cancel: then the triangle is flat there.
-        if (max_component(abs(normal)) > 0.0) result.normal = safe_normalize(normal);
-    }
-    if (HAS_TEXTURES && (record.w & TRIANGLE_TEXCOORDS) != 0u) {
-        float va = uintBitsToFloat(LOAD4(ATTRIBUTES, first.x + 1u).x);
-        float vb = uintBitsToFloat(LOAD4(ATTRIBUTES, first.y + 1u).x);
-        float vc = uintBitsToFloat(LOAD4(ATTRIBUTES, first.z + 1u).x);
-        result.texcoord = vec2(mixed.w, va * weights.x + vb * weights.y + vc * weights.z);
-    }
-    return result;
 }
 
 #endif

@@ -14,7 +14,8 @@ const uint SLOT_TEXELS = 3u;
 
 const uint TRIANGLE_NORMALS = 1u;
 const uint TRIANGLE_TEXCOORDS = 2u;
-const uint VERTEX_TEXELS = 2u;
+const uint TRIANGLE_TANGENTS = 4u;
+const uint TRIANGLE_COLORS = 8u;
 
 const uint BSDF_LAMBERTIAN = 0u;
 const uint BSDF_MIRROR = 1u;
@@ -36,8 +37,11 @@ const uint GGX_ALBEDO_SIZE = 48u;
 const uint TEXTURE_SRGB = 1u;
 const uint TEXTURE_16_BIT = 2u;
 const uint TEXTURE_NEAREST = 4u;
+const uint TEXTURE_SET_1 = 8u;
 const uint TEXTURE_WRAP_U_SHIFT = 4u;
 const uint TEXTURE_WRAP_V_SHIFT = 6u;
+const uint TEXTURE_TRANSFORMED = 0x100u;
+const uint TEXTURE_TEXELS = 3u;
 
 const uint LIGHT_TRIANGLE = 0u;
 const uint LIGHT_POINT = 1u;
@@ -62,7 +66,7 @@ struct RenderConstants {
     vec3 camera_up;
     uint projection;
     vec3 camera_forward;
-    float unused;
+    uint vertex_texels;
     uint width;
     uint height;
     uint seed;
@@ -148,6 +152,8 @@ struct TextureHeader {
     uint width;
     uint height;
     uint sampling;
+    vec3 u_row;
+    vec3 v_row;
 };
 
 struct Light {

@@ -42,11 +42,11 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     float cosine = -dot(direction, point.geometric_normal);
     Material material = load_material(constants, vertices.material);
     if (cosine == 0.0 || !emits_to_side(material, cosine > 0.0)) return NO_LIGHT;
-    vec2 uv = HAS_TEXTURES ? interpolate_vertices(constants, vertices.triangle, light.instance, barycentric).texcoord
-                           : vec2(0.0);
-    vec3 emission = material_emission(constants, material, uv);
+    vec3 emission = material.emission;
+    Vertices attributes = interpolate_vertices(constants, vertices.triangle, light.instance, barycentric);
+    if (HAS_TEXTURES) emission = material_emission(constants, material, attributes.texcoords);
     // The shadow ray does not ask the triangle that it aims at whether it is there.
-    if (HAS_ALPHA) emission *= surface_opacity(constants, material, vertices.triangle, barycentric);
+    if (HAS_ALPHA) emission *= surface_opacity(constants, material, attributes);
     float pdf = pick / point.area * (distance * distance) / abs(cosine);
     return LightSample(direction, distance, emission / pdf, pdf,
                        TriangleId(light.slot, light.instance));

@@ -4,10 +4,13 @@
 #include "bsdf.glsl"
 #include "frame.glsl"
 #include "light.glsl"
+#include "shading_normal.glsl"
 
 struct Surface {
     SurfacePoint point;
-    Frame frame;        // normal on the side of wo
+    Frame frame;        // of the BSDF, normal on the side of wo
+    vec3 horizon;       // normal of the plane above which reflected light leaves
+    vec3 lift;          // where it leaves: this far from the point
     vec3 side_normal;   // geometric normal on the side of wo
     BsdfParameters bsdf;
     vec3 emission;      // towards wo
@@ -15,22 +18,11 @@ struct Surface {
     bool black;         // scatters nothing
 };
 
-vec3 interpolated_normal(Vertices vertices, vec3 side_normal, vec3 wo, bool delta_lobes) {
-    if (!HAS_NORMALS || max_component(abs(vertices.normal)) == 0.0) return side_normal;
-    vec3 n = dot(vertices.normal, side_normal) < 0.0 ? -vertices.normal : vertices.normal;
-    float cosine = dot(n, wo);
-    // Seen from behind the interpolated normal, or mirrored into the surface: the geometric normal stands in.
-    if (cosine <= 0.0) return side_normal;
-    if (delta_lobes && dot(n * (2.0 * cosine) - wo, side_normal) <= 0.0) return side_normal;
-    return n;
-}
-
-BsdfParameters bsdf_parameters(RenderConstants constants, Material material, vec2 uv, bool front) {
+BsdfParameters bsdf_parameters(RenderConstants constants, Material material, Vertices vertices, bool front) {
+    vec4 uv = vertices.texcoords;
     BsdfParameters p;
     p.kind = material.kind_flags & MATERIAL_KIND_MASK;
-    p.color = material.base_color;
-    if (HAS_TEXTURES && material.base_color_texture != NONE)
-        p.color *= sample_texture(constants, material.base_color_texture, uv).rgb;
+    p.color = base_color(constants, material, vertices).rgb;
     p.metallic = material.metallic;
     float roughness = material.roughness;
     if (HAS_TEXTURES && material.metallic_roughness_texture != NONE) {
@@ -56,8 +48,6 @@ BsdfParameters bsdf_parameters(RenderConstants constants, Material material, vec
     return p;
 }
 
-bool kind_has_delta_lobes(uint kind) { return kind == BSDF_MIRROR || kind == BSDF_REFRACT || kind == BSDF_GLASS; }
-
 Surface surface_at(RenderConstants constants, Hit hit, vec3 wo) {
     Surface s;
     TriangleVertices vertices = load_triangle(hit.triangle.slot);
@@ -66,10 +56,18 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo) {
     s.side_normal = front ? s.point.geometric_normal : -s.point.geometric_normal;
     Vertices attributes = interpolate_vertices(constants, vertices.triangle, hit.triangle.instance, hit.barycentric);
     Material material = load_material(constants, vertices.material);
-    s.bsdf = bsdf_parameters(constants, material, attributes.texcoord, front);
-    s.frame = frame_from_normal(interpolated_normal(attributes, s.side_normal, wo, kind_has_delta_lobes(s.bsdf.kind)));
+    s.bsdf = bsdf_parameters(constants, material, attributes, front);
+    Shading shading = shading_at(constants, material, vertices, attributes, s.point, hit, s.side_normal, wo);
+    s.frame = shading.frame;
+    s.horizon = shading.horizon;
+    s.lift = shading.lift;
+    // Between the two horizons of a lifted point, light would come through and be reflected too.
+    if (bsdf_transmits(s.bsdf)) {
+        s.horizon = s.side_normal;
+        s.lift = vec3(0.0);
+    }
     bsdf_prepare(constants, s.bsdf, to_local(s.frame, wo));
-    s.emission = emits_to_side(material, front) ? material_emission(constants, material, attributes.texcoord) : vec3(0.0);
+    s.emission = emits_to_side(material, front) ? material_emission(constants, material, attributes.texcoords) : vec3(0.0);
     s.light = vertices.light;
     if (HAS_INSTANCES && s.light != NONE && hit.triangle.instance != NONE)
         s.light += load_instance_header(constants, hit.triangle.instance).y;
@@ -79,6 +77,61 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo) {
         s.black = true;
     }
     return s;
+}
+
+// f·|cos θi| towards a direction, and the density with which it is scattered to.
+struct Scattering {
+    vec3 value;
+    float pdf;
+};
+
+// Only lobes on the side of the surface count to which the direction leads.
+void add_scattering(inout Scattering sum, Surface s, vec3 wo, vec3 direction, bool through) {
+    vec3 wi = to_local(s.frame, direction);
+    if (wi.y < 0.0 != through || wi.y == 0.0) return;
+    sum.value += bsdf_evaluate(s.bsdf, wo, wi) * abs(wi.y);
+    sum.pdf += bsdf_pdf(s.bsdf, wo, wi);
+}
+
+// The continuous lobes, with what they send through the horizon mirrored back at it: no light is lost and none gained.
+Scattering surface_scattering(Surface s, vec3 wo, vec3 direction, bool through) {
+    Scattering sum = Scattering(vec3(0.0), 0.0);
+    add_scattering(sum, s, wo, direction, through);
+    if (HAS_SHADING_NORMALS)
+        add_scattering(sum, s, wo, mirrored(direction, through ? s.side_normal : s.horizon), through);
+    return sum;
+}
+
+// Draws a direction, in world space, as bsdf_scatter does in the BSDF's frame.
+BsdfSample surface_scatter(Surface s, vec3 wo, vec3 u) {
+    BsdfSample drawn = bsdf_scatter(s.bsdf, wo, u);
+    drawn.wi = to_world(s.frame, drawn.wi);
+    if (!HAS_SHADING_NORMALS) return drawn;
+    bool through = (drawn.flags & SCATTERED_THROUGH) != 0u;
+    vec3 horizon = through ? -s.side_normal : s.horizon;
+    vec3 other = mirrored(drawn.wi, horizon);
+    if (drawn.pdf > 0.0) {
+        Scattering sum = Scattering(drawn.weight * drawn.pdf, drawn.pdf);
+        add_scattering(sum, s, wo, other, through);
+        if (sum.pdf > drawn.pdf) {
+            drawn.weight = sum.value / sum.pdf;
+            drawn.pdf = sum.pdf;
+        }
+    }
+    if (dot(drawn.wi, horizon) < 0.0) drawn.wi = other;
+    return drawn;
+}
+
+// The origin of a ray that is scattered at the surface.
+vec3 scattered_origin(Surface s, bool through) {
+    SurfacePoint point = s.point;
+    if (HAS_NORMALS && !through) point.position += s.lift;
+    return offset_origin(point, through ? -s.side_normal : s.side_normal);
+}
+
+// The triangle that a scattered ray cannot hit: its own, unless it leaves above the triangle and goes below.
+TriangleId scattered_from(Surface s, TriangleId own, vec3 direction, bool through) {
+    return HAS_NORMALS && !through && dot(direction, s.side_normal) < 0.0 ? NO_TRIANGLE : own;
 }
 
 #endif

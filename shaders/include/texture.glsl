@@ -47,8 +47,12 @@ float texel_coordinate(float x, uint size, uint mode) {
     return x * float(size);
 }
 
-vec4 sample_texture(RenderConstants constants, uint index, vec2 uv) {
+// `texcoords`: the two sets; the texture's header says which of them is looked up, and how it is transformed.
+vec4 sample_texture(RenderConstants constants, uint index, vec4 texcoords) {
     TextureHeader header = load_texture_header(constants, index);
+    vec2 uv = (header.sampling & TEXTURE_SET_1) != 0u ? texcoords.zw : texcoords.xy;
+    if ((header.sampling & TEXTURE_TRANSFORMED) != 0u)
+        uv = vec2(dot(header.u_row, vec3(uv, 1.0)), dot(header.v_row, vec3(uv, 1.0)));
     float x = texel_coordinate(uv.x, header.width, (header.sampling >> TEXTURE_WRAP_U_SHIFT) & 3u);
     float y = texel_coordinate(uv.y, header.height, (header.sampling >> TEXTURE_WRAP_V_SHIFT) & 3u);
     if ((header.sampling & TEXTURE_NEAREST) != 0u) return fetch_texel(header, ivec2(floor(vec2(x, y))));
@@ -60,11 +64,11 @@ vec4 sample_texture(RenderConstants constants, uint index, vec2 uv) {
     return mix(top, bottom, f.y);
 }
 
-// Emitted radiance of a material at a texture coordinate.
-vec3 material_emission(RenderConstants constants, Material material, vec2 uv) {
+// Emitted radiance of a material at texture coordinates.
+vec3 material_emission(RenderConstants constants, Material material, vec4 texcoords) {
     vec3 emission = material.emission;
     if (HAS_TEXTURES && material.emission_texture != NONE)
-        emission *= sample_texture(constants, material.emission_texture, uv).rgb;
+        emission *= sample_texture(constants, material.emission_texture, texcoords).rgb;
     return emission;
 }
 

@@ -2,6 +2,7 @@
 // The decoders of records.glsl and geometry.glsl: lane i loads record i of each table and writes its fields, texel by
 // texel in the order in which they are documented in src/layout.rs.
 #include "../include/test_kernel.glsl"
+#include "../include/attributes.glsl"
 #include "../include/geometry.glsl"
 
 uint bits(float x) { return floatBitsToUint(x); }
@@ -10,7 +11,7 @@ uvec3 bits(vec3 v) { return floatBitsToUint(v); }
 void main() {
     uint lane = gl_GlobalInvocationID.x;
     if (lane >= lanes) return;
-    uint o = 28u * lane;
+    uint o = 32u * lane;
     Material m = load_material(constants, lane);
     outputs[o] = uvec4(bits(m.base_color), m.kind_flags);
     outputs[o + 1u] = uvec4(bits(m.emission), bits(m.roughness));
@@ -27,26 +28,30 @@ void main() {
     outputs[o + 11u] = uvec4(bits(light.cone_scale), bits(light.cone_offset), 0u, 0u);
     TextureHeader header = load_texture_header(constants, lane);
     outputs[o + 12u] = uvec4(header.first_word, header.width, header.height, header.sampling);
+    outputs[o + 13u] = uvec4(bits(header.u_row), 0u);
+    outputs[o + 14u] = uvec4(bits(header.v_row), 0u);
     Affine forward = load_object_to_world(constants, lane);
     Affine backward = load_world_to_object(constants, lane);
-    outputs[o + 13u] = floatBitsToUint(forward.x);
-    outputs[o + 14u] = floatBitsToUint(forward.y);
-    outputs[o + 15u] = floatBitsToUint(forward.z);
-    outputs[o + 16u] = floatBitsToUint(backward.x);
-    outputs[o + 17u] = floatBitsToUint(backward.y);
-    outputs[o + 18u] = floatBitsToUint(backward.z);
-    outputs[o + 19u] = load_instance_header(constants, lane);
+    outputs[o + 15u] = floatBitsToUint(forward.x);
+    outputs[o + 16u] = floatBitsToUint(forward.y);
+    outputs[o + 17u] = floatBitsToUint(forward.z);
+    outputs[o + 18u] = floatBitsToUint(backward.x);
+    outputs[o + 19u] = floatBitsToUint(backward.y);
+    outputs[o + 20u] = floatBitsToUint(backward.z);
+    outputs[o + 21u] = load_instance_header(constants, lane);
     TriangleVertices t = load_triangle(lane);
-    outputs[o + 20u] = uvec4(bits(t.a), t.triangle);
-    outputs[o + 21u] = uvec4(bits(t.b), t.light);
-    outputs[o + 22u] = uvec4(bits(t.c), t.material);
+    outputs[o + 22u] = uvec4(bits(t.a), t.triangle);
+    outputs[o + 23u] = uvec4(bits(t.b), t.light);
+    outputs[o + 24u] = uvec4(bits(t.c), t.material);
     // At a corner the interpolated attributes are those of one vertex.
     Vertices v = interpolate_vertices(constants, lane, NONE, vec2(0.0, 1.0));
-    outputs[o + 23u] = uvec4(bits(v.normal), bits(v.texcoord.x));
-    outputs[o + 24u] = uvec4(bits(v.texcoord.y), 0u, 0u, 0u);
+    outputs[o + 25u] = uvec4(bits(v.normal), 0u);
+    outputs[o + 26u] = floatBitsToUint(v.texcoords);
+    outputs[o + 27u] = floatBitsToUint(v.tangent);
+    outputs[o + 28u] = floatBitsToUint(v.color);
     // The generated words, through the word accessor.
-    outputs[o + 25u] = uvec4(LOAD1(TEXELS, 4u * lane), LOAD1(TEXELS, 4u * lane + 1u), LOAD1(TEXELS, 4u * lane + 2u),
+    outputs[o + 29u] = uvec4(LOAD1(TEXELS, 4u * lane), LOAD1(TEXELS, 4u * lane + 1u), LOAD1(TEXELS, 4u * lane + 2u),
                              LOAD1(TEXELS, 4u * lane + 3u));
-    outputs[o + 26u] = LOAD4(TEXELS, lane);
-    outputs[o + 27u] = LOAD4(ENVIRONMENT, lane);
+    outputs[o + 30u] = LOAD4(TEXELS, lane);
+    outputs[o + 31u] = LOAD4(ENVIRONMENT, lane);
 }

@@ -19,10 +19,15 @@ pub(super) enum Presence {
 }
 
 impl Presence {
-    /// What `material` comes to. Alpha lies between its factor times the least and times the largest alpha of the texels;
-    /// interpolated ones lie between theirs.
-    pub(super) fn of(scene: &Scene, material: &Material) -> Self {
-        let (least, largest) = alpha_range(scene, material);
+    /// What a material comes to. Alpha lies between its factor times the least and times the largest alpha of the texels and
+    /// of the vertices; interpolated ones lie between theirs.
+    pub(super) fn of(scene: &Scene, index: usize) -> Self {
+        let material = &scene.materials[index];
+        if material.alpha_mode == AlphaMode::Opaque {
+            return Self::Opaque;
+        }
+        let (texel_range, vertex_range) = (alpha_range(scene, material), vertex_alpha_range(scene, index));
+        let (least, largest) = (texel_range.0 * vertex_range.0, texel_range.1 * vertex_range.1);
         match material.alpha_mode {
             AlphaMode::Opaque => Self::Opaque,
             AlphaMode::Mask { cutoff } if least >= cutoff => Self::Opaque,
@@ -35,7 +40,16 @@ impl Presence {
     }
 }
 
-/// The least and the largest alpha that the surface can have.
+/// The least and the largest alpha of the vertices that have the material.
+fn vertex_alpha_range(scene: &Scene, material: usize) -> (f32, f32) {
+    let primitives = scene.meshes.iter().flat_map(|mesh| &mesh.primitives).filter(|p| p.material == material);
+    range(primitives.flat_map(|primitive| {
+        let colors = primitive.colors.as_deref().unwrap_or(&[[1.0; 4]]);
+        colors.iter().map(|color| color[3])
+    }))
+}
+
+/// The least and the largest alpha of the factor times the texels.
 fn alpha_range(scene: &Scene, material: &Material) -> (f32, f32) {
     let Some(binding) = material.base_color_texture else { return (material.alpha, material.alpha) };
     let (least, largest) = match &scene.images[scene.textures[binding.texture].image].texels {

@@ -2,7 +2,7 @@
 
 use super::luminance;
 use super::textures::srgb_to_linear;
-use crate::scene::{Image, Scene, Texels, Texture, Wrap};
+use crate::scene::{Image, Scene, Texels, Texture, TextureBinding, TextureTransform, Wrap};
 
 /// Share of the mean over the triangle's texture box in the estimate; the rest is the mean over points. The box misses no
 /// bright texel, so a triangle that emits at all has a positive estimate.
@@ -17,6 +17,9 @@ pub(super) struct EmissionMap {
     width: usize,
     height: usize,
     texture: Texture,
+    /// The set of texture coordinates that is looked up.
+    pub(super) set: usize,
+    transform: TextureTransform,
     luminance: Vec<f32>,
     /// Row-major, one row and one column more than the image: sums of luminance above and to the left.
     sums: Vec<f64>,
@@ -26,8 +29,8 @@ pub(super) struct EmissionMap {
 
 impl EmissionMap {
     /// The map of a texture times a factor.
-    pub(super) fn new(scene: &Scene, texture: usize, emission: [f32; 3]) -> Self {
-        let texture = scene.textures[texture];
+    pub(super) fn new(scene: &Scene, binding: TextureBinding, emission: [f32; 3]) -> Self {
+        let texture = scene.textures[binding.texture];
         let image = &scene.images[texture.image];
         let luminance = texel_luminance(image, emission);
         let (width, height) = (image.width as usize, image.height as usize);
@@ -44,7 +47,7 @@ impl EmissionMap {
                 counts[(y + 1) * stride + x + 1] = counts[y * stride + x + 1] + row_count;
             }
         }
-        Self { width, height, texture, luminance, sums, counts }
+        Self { width, height, texture, set: binding.set, transform: binding.transform, luminance, sums, counts }
     }
 
     /// Whether every texel is black.
@@ -52,16 +55,17 @@ impl EmissionMap {
         self.counts.last() == Some(&0)
     }
 
-    /// An estimate of the mean luminance over a triangle with these texture coordinates: zero only if no lookup on it can
-    /// be positive.
+    /// An estimate of the mean luminance over a triangle with these texture coordinates of its set: zero only if no lookup
+    /// on it can be positive.
     pub(super) fn mean(&self, texcoords: [[f32; 2]; 3]) -> f64 {
+        let texcoords = texcoords.map(|uv| self.transform.apply(uv.map(f64::from)));
         let (box_mean, any) = self.box_mean(texcoords);
         if any { BOX_SHARE * box_mean + (1.0 - BOX_SHARE) * self.point_mean(texcoords) } else { 0.0 }
     }
 
     /// Mean over the texels that lookups in the triangle's box of texture coordinates can touch, and whether any of them
     /// is not black. One more texel on each side allows for the rounding of interpolated coordinates.
-    fn box_mean(&self, texcoords: [[f32; 2]; 3]) -> (f64, bool) {
+    fn box_mean(&self, texcoords: [[f64; 2]; 3]) -> (f64, bool) {
         let columns = touched(texcoords.map(|t| t[0]), self.width, self.texture.wrap_u);
         let rows = touched(texcoords.map(|t| t[1]), self.height, self.texture.wrap_v);
         let (mut sum, mut area, mut count) = (0.0, 0.0, 0u32);
@@ -79,8 +83,7 @@ impl EmissionMap {
     }
 
     /// Mean over a fixed pattern of points, about one a texel.
-    fn point_mean(&self, texcoords: [[f32; 2]; 3]) -> f64 {
-        let [a, b, c] = texcoords.map(|t| t.map(f64::from));
+    fn point_mean(&self, [a, b, c]: [[f64; 2]; 3]) -> f64 {
         let area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs();
         let points = (area * (self.width * self.height) as f64).clamp(LEAST_POINTS, MOST_POINTS) as usize;
         let mut sum = 0.0;
@@ -122,8 +125,8 @@ fn wrap_texel(index: f64, size: usize, wrap: Wrap) -> usize {
 }
 
 /// Up to two half-open ranges of texels along one axis that lookups between the least and the largest coordinate touch.
-fn touched(coordinates: [f32; 3], size: usize, wrap: Wrap) -> [(usize, usize); 2] {
-    let scaled = coordinates.map(|c| f64::from(c) * size as f64);
+fn touched(coordinates: [f64; 3], size: usize, wrap: Wrap) -> [(usize, usize); 2] {
+    let scaled = coordinates.map(|c| c * size as f64);
     let least = scaled.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = scaled.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     // Bilinear lookups touch ⌊c − ½⌋ and the next; one more on each side for rounding.

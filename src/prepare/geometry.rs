@@ -8,6 +8,7 @@ use super::attributes::{Attributes, MeshGeometry, add_primitive};
 use super::bounds::DBounds;
 use super::instances::can_stay_instance;
 use super::materials::MaterialTable;
+use super::vertices::Vertices;
 use super::{PrepareError, PrepareOptions};
 use crate::scene::{Mesh, Scene};
 
@@ -46,6 +47,7 @@ pub(super) fn gather(
 ) -> Result<Geometry, PrepareError> {
     let mesh_bounds: Vec<DBounds> = scene.meshes.iter().map(bounds_of_mesh).collect();
     let mut geometry = Geometry { origin: origin(scene, &mesh_bounds, options.camera)?, ..Geometry::default() };
+    geometry.attributes.vertices = Vertices::for_scene(scene, materials);
     let stays = which_stay(scene, options);
     let repeated = which_repeat(scene, materials);
     let placed = || scene.instances.iter().enumerate().filter(|(index, _)| !repeated[*index]);

@@ -8,7 +8,7 @@ use super::textures::{ColorSpace, TextureTable};
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_ALPHA_BLEND,
     MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK, Material,
-    NONE, SLOT_MATERIAL_MASK,
+    NONE, SLOT_MATERIAL_MASK, TEXTURE_SET_1,
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding};
 
@@ -32,8 +32,10 @@ pub(super) struct MaterialUse {
     pub absent: bool,
     /// Traversal decides where it is there.
     pub alpha: bool,
-    /// Some texture is looked up.
-    pub textured: bool,
+    /// Which sets of texture coordinates are looked up.
+    pub texcoord_sets: [bool; 2],
+    /// Tangents matter.
+    pub tangents: bool,
     /// Shading normals matter.
     pub shaded: bool,
     /// It emits somewhere, and its triangles are lights.
@@ -42,8 +44,15 @@ pub(super) struct MaterialUse {
 
 impl MaterialUse {
     /// That of a surface that is nowhere there.
-    const ABSENT: Self =
-        Self { record: u32::MAX, absent: true, alpha: false, textured: false, shaded: false, emissive: false };
+    const ABSENT: Self = Self {
+        record: u32::MAX,
+        absent: true,
+        alpha: false,
+        texcoord_sets: [false; 2],
+        tangents: false,
+        shaded: false,
+        emissive: false,
+    };
 }
 
 impl MaterialTable {
@@ -60,7 +69,7 @@ impl MaterialTable {
             }
             for primitive in scene.meshes[instance.mesh].primitives.iter().filter(|p| !p.triangles.is_empty()) {
                 if table.uses[primitive.material].is_none() {
-                    let used = table.add(scene, &scene.materials[primitive.material], textures)?;
+                    let used = table.add(scene, primitive.material, textures)?;
                     table.uses[primitive.material] = Some(used);
                 }
             }
@@ -96,6 +105,7 @@ impl MaterialTable {
             features.textures |= textures_of(record).iter().any(|&texture| texture != NONE);
             features.emission_textures |= record.emission_texture != NONE;
             features.emission |= record.emission != [0.0; 3];
+            features.normal_maps |= record.normal_texture != NONE;
             features.transmission |= record.transmission > 0.0;
             features.specular |= has_specular(record);
             features.alpha |= record.kind_flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0;
@@ -104,30 +114,27 @@ impl MaterialTable {
         }
     }
 
-    fn add(
-        &mut self,
-        scene: &Scene,
-        material: &scene::Material,
-        textures: &mut TextureTable,
-    ) -> Result<MaterialUse, PrepareError> {
-        let presence = Presence::of(scene, material);
+    fn add(&mut self, scene: &Scene, index: usize, textures: &mut TextureTable) -> Result<MaterialUse, PrepareError> {
+        let material = &scene.materials[index];
+        let presence = Presence::of(scene, index);
         if presence == Presence::Absent {
             return Ok(MaterialUse::ABSENT);
         }
-        let index = self.records.len() as u32;
-        if index > SLOT_MATERIAL_MASK {
+        let record_index = self.records.len() as u32;
+        if record_index > SLOT_MATERIAL_MASK {
             return Err(PrepareError::TooManyMaterials);
         }
         let mut bind = |binding: Option<TextureBinding>, needed: bool, space: ColorSpace| match binding {
-            Some(binding) if needed => textures.add(scene, binding.texture, space),
+            Some(binding) if needed => textures.add(scene, binding, space),
             _ => Ok(NONE),
         };
         let alpha = presence != Presence::Opaque;
+        let shaded = material.bsdf != Bsdf::Unlit;
         let rough = material.bsdf == Bsdf::MetallicRoughness;
         // KHR_materials_unlit: emission is ignored.
         let may_emit = material.is_emissive() && material.bsdf != Bsdf::Unlit;
         let map = match material.emission_texture {
-            Some(binding) if may_emit => Some(EmissionMap::new(scene, binding.texture, material.emission)),
+            Some(binding) if may_emit => Some(EmissionMap::new(scene, binding, material.emission)),
             _ => None,
         };
         let emissive = may_emit && !map.as_ref().is_some_and(EmissionMap::is_black);
@@ -148,7 +155,7 @@ impl MaterialTable {
             )?,
             metallic_roughness_texture: bind(material.metallic_roughness_texture, rough, ColorSpace::Linear)?,
             emission_texture: bind(material.emission_texture, emissive, ColorSpace::Srgb)?,
-            normal_texture: NONE,
+            normal_texture: bind(material.normal_texture, shaded && material.normal_scale != 0.0, ColorSpace::Linear)?,
             specular_color: material.specular_color,
             specular: material.specular,
             absorption: [0.0; 3],
@@ -166,17 +173,15 @@ impl MaterialTable {
                 ColorSpace::Linear,
             )?,
         };
-        let textured = textures_of(&record).iter().any(|&texture| texture != NONE);
+        let mut texcoord_sets = [false; 2];
+        for texture in textures_of(&record).into_iter().filter(|&texture| texture != NONE) {
+            let second = textures.headers[texture as usize].sampling & TEXTURE_SET_1 != 0;
+            texcoord_sets[usize::from(second)] = true;
+        }
+        let tangents = record.normal_texture != NONE || rough && material.anisotropy > 0.0;
         self.records.push(record);
         self.emission_maps.push(map.filter(|_| emissive));
-        Ok(MaterialUse {
-            record: index,
-            absent: false,
-            alpha,
-            textured,
-            shaded: material.bsdf != Bsdf::Unlit,
-            emissive,
-        })
+        Ok(MaterialUse { record: record_index, absent: false, alpha, texcoord_sets, tangents, shaded, emissive })
     }
 }
 

@@ -19,6 +19,7 @@ mod lights;
 mod materials;
 mod pack;
 mod textures;
+mod vertices;
 
 use std::ops::Range;
 use std::time::Instant;

@@ -10,7 +10,7 @@ use super::lights::LightTable;
 use super::materials::MaterialTable;
 use super::textures::TextureTable;
 use super::{PreparedInstance, Statistics};
-use crate::layout::{RenderConstants, SCENE_ARRAYS, TRIANGLE_NORMALS, Texel};
+use crate::layout::{RenderConstants, SCENE_ARRAYS, TRIANGLE_COLORS, TRIANGLE_NORMALS, Texel};
 
 /// Words in texels of four, the last padded with zeros.
 pub(super) fn pack_words(words: &[u32]) -> Vec<Texel> {
@@ -48,11 +48,12 @@ pub(super) fn pack_arrays(
     let bounds = acceleration.bounds.to_f64();
     let mut attributes = Vec::new();
     append(&mut attributes, &geometry.attributes.triangles);
-    let vertices = append(&mut attributes, &geometry.attributes.vertices);
+    let vertices = append(&mut attributes, &geometry.attributes.vertices.texels);
     let mut tables = Vec::new();
     let (sin, cos) = environment.rotation_radians.sin_cos();
     let constants = RenderConstants {
         vertices,
+        vertex_texels: geometry.attributes.vertices.stride(),
         root_slot: acceleration.meshes.first().map_or(0, |world| world.root_slot),
         materials: append(&mut tables, &materials.records),
         textures: append(&mut tables, &textures.headers),
@@ -89,10 +90,12 @@ pub(super) fn features(
     environment: &PreparedEnvironment,
     lights: &LightTable,
 ) -> Features {
+    let any = |flag: u32| geometry.attributes.triangles.iter().any(|triangle| triangle.flags & flag != 0);
     let mut features = Features {
         lights: lights.kinds(),
         instances: !acceleration.instances.is_empty(),
-        normals: geometry.attributes.triangles.iter().any(|triangle| triangle.flags & TRIANGLE_NORMALS != 0),
+        normals: any(TRIANGLE_NORMALS),
+        vertex_colors: any(TRIANGLE_COLORS),
         environment: environment.kind,
         environment_importance: environment.conditional_word != 0,
         ..Features::default()

@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use super::PrepareError;
 use crate::layout::{
-    TEXTURE_16_BIT, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT, Texel, TextureHeader,
+    TEXTURE_16_BIT, TEXTURE_NEAREST, TEXTURE_SET_1, TEXTURE_SRGB, TEXTURE_TRANSFORMED, TEXTURE_WRAP_U_SHIFT,
+    TEXTURE_WRAP_V_SHIFT, Texel, TextureHeader,
 };
-use crate::scene::{Filter, Image, Scene, Texels, Texture, Wrap};
+use crate::scene::{Filter, Image, Scene, Texels, Texture, TextureBinding, TextureTransform, Wrap};
 
 /// How a texture's numbers are to be read, which follows from what it is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -25,26 +26,44 @@ pub(super) struct TextureTable {
     /// The texel array, packed words.
     pub texels: Vec<Texel>,
     images: HashMap<usize, u32>,
-    /// By (image, sampling bits): textures that read the same words in the same way are one.
-    known: HashMap<(usize, u32), u32>,
+    /// Textures that read the same words in the same way are one.
+    known: HashMap<Key, u32>,
 }
+
+/// Image, sampling bits, and the bits of the transform.
+type Key = (usize, u32, [[u32; 3]; 2]);
 
 impl TextureTable {
     /// Index of the header for a texture of the scene in the given use; its image is stored at the first use.
     ///
     /// # Errors
     /// If the texels of all images are more words than 32 bits can address.
-    pub(super) fn add(&mut self, scene: &Scene, texture: usize, space: ColorSpace) -> Result<u32, PrepareError> {
-        let texture = &scene.textures[texture];
+    pub(super) fn add(
+        &mut self,
+        scene: &Scene,
+        binding: TextureBinding,
+        space: ColorSpace,
+    ) -> Result<u32, PrepareError> {
+        let texture = &scene.textures[binding.texture];
         let image = &scene.images[texture.image];
-        let sampling = sampling_bits(texture, image, space);
-        if let Some(&index) = self.known.get(&(texture.image, sampling)) {
+        let mut sampling = sampling_bits(texture, image, space);
+        if binding.set == 1 {
+            sampling |= TEXTURE_SET_1;
+        }
+        if binding.transform != TextureTransform::IDENTITY {
+            sampling |= TEXTURE_TRANSFORMED;
+        }
+        let [u_row, v_row] = binding.transform.rows;
+        let key = (texture.image, sampling, [u_row, v_row].map(|row| row.map(f32::to_bits)));
+        if let Some(&index) = self.known.get(&key) {
             return Ok(index);
         }
         let first_word = self.store(texture.image, image)?;
         let index = self.headers.len() as u32;
-        self.headers.push(TextureHeader { first_word, width: image.width, height: image.height, sampling });
-        self.known.insert((texture.image, sampling), index);
+        let (width, height) = (image.width, image.height);
+        let header = TextureHeader { first_word, width, height, sampling, u_row, v_row, ..TextureHeader::default() };
+        self.headers.push(header);
+        self.known.insert(key, index);
         Ok(index)
     }
 

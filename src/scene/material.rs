@@ -1,6 +1,6 @@
 //! Materials: which BSDF, its parameters, and what the surface emits.
 
-use super::TextureBinding;
+use super::{TextureBinding, TextureTransform};
 
 /// The scattering model of a [`Material`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -167,6 +167,26 @@ impl Material {
         ]
         .into_iter()
         .flatten()
+    }
+
+    /// Which sets of texture coordinates its textures look up.
+    pub fn texcoord_sets(&self) -> [bool; 2] {
+        self.textures().fold([false; 2], |mut sets, binding| {
+            sets[binding.set] = true;
+            sets
+        })
+    }
+
+    /// Where shading needs a tangent: the set and the transform of the texture coordinates along which it runs, those of
+    /// the normal texture if there is one, else those of the anisotropy texture, else set 0.
+    pub fn tangent_coordinates(&self) -> Option<(usize, TextureTransform)> {
+        let needed = match self.bsdf {
+            Bsdf::Unlit => false,
+            Bsdf::MetallicRoughness => self.normal_texture.is_some() || self.anisotropy > 0.0,
+            _ => self.normal_texture.is_some(),
+        };
+        let binding = self.normal_texture.or(self.anisotropy_texture);
+        needed.then(|| binding.map_or((0, TextureTransform::IDENTITY), |b| (b.set, b.transform)))
     }
 
     /// Whether any point of the surface can emit light that is sampled (unlit surfaces are seen, not sampled).

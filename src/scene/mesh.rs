@@ -20,10 +20,28 @@ pub struct Primitive {
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates of set 0, v downwards as in glTF.
     pub texcoords: Option<Vec<[f32; 2]>>,
+    /// Texture coordinates of set 1.
+    pub texcoords_1: Option<Vec<[f32; 2]>>,
+    /// Unit tangents, along the u of the normal texture's coordinates, and the sign (1 or −1) of the bitangent,
+    /// sign·(normal × tangent), which points up the image. What needs tangents makes do without where they are missing.
+    pub tangents: Option<Vec<[f32; 4]>>,
+    /// Linear colours and alpha, in [0, 1]; they multiply the material's.
+    pub colors: Option<Vec<[f32; 4]>>,
     /// Triangles, each index below `positions.len()`; counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Index into `Scene::materials`.
     pub material: usize,
+}
+
+impl Primitive {
+    /// A set of texture coordinates, if the primitive has it.
+    pub fn texcoord_set(&self, set: usize) -> Option<&[[f32; 2]]> {
+        match set {
+            0 => self.texcoords.as_deref(),
+            1 => self.texcoords_1.as_deref(),
+            _ => None,
+        }
+    }
 }
 
 /// A mesh placed in the world.

@@ -12,6 +12,7 @@ mod light;
 pub mod load;
 mod material;
 mod mesh;
+mod tangents;
 mod texture;
 mod validate;
 
@@ -21,7 +22,7 @@ pub use error::{SceneError, SceneResult};
 pub use light::{PunctualKind, PunctualLight};
 pub use material::{AlphaMode, Bsdf, Fresnel, Material, Volume};
 pub use mesh::{Instance, Mesh, Primitive};
-pub use texture::{Filter, Image, Texels, Texture, TextureBinding, Wrap};
+pub use texture::{Filter, Image, Texels, Texture, TextureBinding, TextureTransform, Wrap};
 
 /// A scene: meshes placed by instances, seen by cameras, lit by emissive materials, punctual lights and an environment.
 #[derive(Clone, Debug, Default)]

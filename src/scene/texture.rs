@@ -58,8 +58,43 @@ pub struct Texture {
 }
 
 /// A texture as a material refers to it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureBinding {
     /// Index into `Scene::textures`.
     pub texture: usize,
+    /// Which of the primitive's sets of texture coordinates is looked up: 0 or 1.
+    pub set: usize,
+    /// What happens to the coordinates before the lookup.
+    pub transform: TextureTransform,
+}
+
+impl TextureBinding {
+    /// The texture on set 0, untransformed.
+    pub const fn new(texture: usize) -> Self {
+        Self { texture, set: 0, transform: TextureTransform::IDENTITY }
+    }
+}
+
+/// An affine map of texture coordinates: rows (a, b, t) of u′ = a·u + b·v + t.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureTransform {
+    /// The row of u′, then that of v′; finite.
+    pub rows: [[f32; 3]; 2],
+}
+
+impl TextureTransform {
+    /// Leaves coordinates as they are.
+    pub const IDENTITY: Self = Self { rows: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+
+    /// Scales, then rotates counter-clockwise as seen on the image (v points down), then moves: KHR_texture_transform.
+    pub fn new(offset: [f64; 2], rotation_radians: f64, scale: [f64; 2]) -> Self {
+        let (sin, cos) = rotation_radians.sin_cos();
+        let rows = [[cos * scale[0], sin * scale[1], offset[0]], [-sin * scale[0], cos * scale[1], offset[1]]];
+        Self { rows: rows.map(|row| row.map(|x| x as f32)) }
+    }
+
+    /// The coordinates at which the texture is looked up.
+    pub fn apply(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        self.rows.map(|[a, b, t]| f64::from(a) * u + f64::from(b) * v + f64::from(t))
+    }
 }

@@ -71,19 +71,30 @@ impl Check<'_> {
         let count = primitive.positions.len();
         self.index(&format!("{place}.material"), primitive.material, materials)?;
         let normals_fit = primitive.normals.as_ref().is_none_or(|normals| normals.len() == count);
-        let texcoords_fit = primitive.texcoords.as_ref().is_none_or(|texcoords| texcoords.len() == count);
+        let texcoords_fit = [0, 1].iter().all(|&set| primitive.texcoord_set(set).is_none_or(|t| t.len() == count));
+        let colors_fit = primitive.colors.as_ref().is_none_or(|colors| colors.len() == count);
+        let tangents_fit = primitive.tangents.as_ref().is_none_or(|tangents| tangents.len() == count);
         self.that(
-            normals_fit && texcoords_fit,
+            normals_fit && texcoords_fit && colors_fit && tangents_fit,
             place,
-            "normals or texture coordinates differ in number from positions",
+            "normals, tangents, colours or texture coordinates differ in number from positions",
         )?;
         let finite = primitive.positions.iter().flatten().all(|x| x.is_finite());
         self.that(finite, place, "a position is not finite")?;
         let unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-3;
         let normals_are_unit = primitive.normals.iter().flatten().all(unit);
         self.that(normals_are_unit, place, "a normal is not of unit length")?;
-        let finite = primitive.texcoords.iter().flatten().flatten().all(|x| x.is_finite());
-        self.that(finite, place, "a texture coordinate is not finite")?;
+        let mut texcoords = primitive.texcoords.iter().chain(&primitive.texcoords_1).flatten().flatten();
+        self.that(texcoords.all(|x| x.is_finite()), place, "a texture coordinate is not finite")?;
+        let is_tangent = |t: &[f32; 4]| t[..3] == [0.0; 3] || unit(&[t[0], t[1], t[2]]) && t[3].abs() == 1.0;
+        let tangents_are_valid = primitive.tangents.iter().flatten().all(is_tangent);
+        self.that(
+            tangents_are_valid,
+            place,
+            "a tangent is neither zero nor of unit length, or its sign is not 1 or -1",
+        )?;
+        let mut colors = primitive.colors.iter().flatten().flatten();
+        self.that(colors.all(|c| (0.0..=1.0).contains(c)), place, "a vertex colour is outside [0, 1]")?;
         let in_range = primitive.triangles.iter().flatten().all(|&vertex| (vertex as usize) < count);
         self.that(in_range, place, "a triangle's vertex index is out of range")
     }
@@ -91,6 +102,9 @@ impl Check<'_> {
     fn material(&self, place: &str, material: &Material, textures: usize) -> SceneResult<()> {
         for binding in material.textures() {
             self.index(place, binding.texture, textures)?;
+            self.that(binding.set < 2, place, "a texture looks up a set of coordinates other than 0 and 1")?;
+            let finite = binding.transform.rows.iter().flatten().all(|x| x.is_finite());
+            self.that(finite, place, "a texture transform is not finite")?;
         }
         let unit = |x: f32| (0.0..=1.0).contains(&x);
         let factors = [

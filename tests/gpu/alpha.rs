@@ -201,7 +201,7 @@ fn add_alpha_texture(scene: &mut Scene, alphas: &[u8]) -> TextureBinding {
         wrap_v: Wrap::ClampToEdge,
         filter: Filter::Nearest,
     });
-    TextureBinding { texture: scene.textures.len() - 1 }
+    TextureBinding::new(scene.textures.len() - 1)
 }
 
 /// A lamp of which a mask leaves three quarters, and of these one quarter is a lamp of half the alpha by BLEND.

@@ -124,7 +124,7 @@ fn reflect() -> Blocks {
 
 fn render_constants_fields() -> Vec<Field> {
     rust_fields!(RenderConstants: camera_origin, lens_radius, camera_right, focus_distance, camera_up, projection,
-        camera_forward, unused, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
+        camera_forward, vertex_texels, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
         materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
         environment_height, environment_marginal_word, environment_conditional_word, ggx_albedo, environment_radiance,
         environment_cos, scene_center, environment_sin)
@@ -216,13 +216,15 @@ fn records_survive_the_way_to_the_shader() {
     let mut kernel = TestKernel::new("records.comp");
     let materials: Vec<layout::Material> = random_records(&mut random);
     let lights: Vec<layout::Light> = random_records(&mut random);
-    let headers: Vec<layout::TextureHeader> = random_records(&mut random);
+    let mut headers: Vec<layout::TextureHeader> = random_records(&mut random);
+    headers.iter_mut().for_each(|header| header.sampling |= layout::TEXTURE_TRANSFORMED);
     let instances: Vec<layout::InstanceRecord> = random_records(&mut random);
     let leaves: Vec<layout::LeafSlot> = random_records(&mut random);
     let vertices: Vec<layout::Vertex> = random_records(&mut random);
     let texels: Vec<[u32; 4]> = random_records(&mut random);
-    let both = layout::TRIANGLE_NORMALS | layout::TRIANGLE_TEXCOORDS;
-    let triangle = |i: u32| layout::Triangle { vertices: [0, 1, RECORDS as u32 - 1 - i], flags: both };
+    let all =
+        layout::TRIANGLE_NORMALS | layout::TRIANGLE_TEXCOORDS | layout::TRIANGLE_TANGENTS | layout::TRIANGLE_COLORS;
+    let triangle = |i: u32| layout::Triangle { vertices: [RECORDS as u32 - 1 - i; 3], flags: all };
     let triangles: Vec<layout::Triangle> = (0..RECORDS as u32).map(triangle).collect();
 
     let constants = &mut kernel.constants;
@@ -231,6 +233,7 @@ fn records_survive_the_way_to_the_shader() {
     *attributes = bytemuck::cast_slice(&triangles).to_vec();
     constants.vertices = attributes.len() as u32;
     attributes.extend_from_slice(bytemuck::cast_slice(&vertices));
+    constants.vertex_texels = (size_of::<layout::Vertex>() / 16) as u32;
     tables.clear();
     let mut append = |texels: &[[u32; 4]]| {
         let first = tables.len() as u32;
@@ -244,18 +247,19 @@ fn records_survive_the_way_to_the_shader() {
     *image = texels.clone();
     *environment = texels.iter().rev().copied().collect();
 
-    let outputs = kernel.run(&[[0; 4]], RECORDS, 28);
-    for (i, output) in outputs.chunks_exact(28).enumerate() {
+    let outputs = kernel.run(&[[0; 4]], RECORDS, 32);
+    for (i, output) in outputs.chunks_exact(32).enumerate() {
         assert_eq!(&output[..8], bytemuck::cast_slice::<_, [u32; 4]>(&[materials[i]]), "material");
         let light = layout::Light { unused: [0; 2], ..lights[i] };
         assert_eq!(&output[8..12], bytemuck::cast_slice::<_, [u32; 4]>(&[light]), "light");
-        assert_eq!(&output[12..13], bytemuck::cast_slice::<_, [u32; 4]>(&[headers[i]]), "texture header");
-        assert_eq!(&output[13..20], bytemuck::cast_slice::<_, [u32; 4]>(&[instances[i]]), "instance");
-        assert_eq!(output[20..23], decoded_leaf(&leaves[i]), "leaf slot");
-        check_vertex(&vertices[RECORDS - 1 - i], output[23], output[24]);
-        assert_eq!(output[25], texels[i], "words");
-        assert_eq!(output[26], texels[i], "texels");
-        assert_eq!(output[27], texels[RECORDS - 1 - i], "environment");
+        let header = layout::TextureHeader { unused: 0, unused_too: 0, ..headers[i] };
+        assert_eq!(&output[12..15], bytemuck::cast_slice::<_, [u32; 4]>(&[header]), "texture header");
+        assert_eq!(&output[15..22], bytemuck::cast_slice::<_, [u32; 4]>(&[instances[i]]), "instance");
+        assert_eq!(output[22..25], decoded_leaf(&leaves[i]), "leaf slot");
+        check_vertex(&vertices[RECORDS - 1 - i], &output[25..29]);
+        assert_eq!(output[29], texels[i], "words");
+        assert_eq!(output[30], texels[i], "texels");
+        assert_eq!(output[31], texels[RECORDS - 1 - i], "environment");
     }
 }
 
@@ -268,9 +272,13 @@ fn decoded_leaf(leaf: &layout::LeafSlot) -> [[u32; 4]; 3] {
     [row(a, leaf.triangle), row(b, leaf.light), row(c, leaf.kind & layout::SLOT_MATERIAL_MASK)]
 }
 
-fn check_vertex(vertex: &layout::Vertex, first: [u32; 4], second: [u32; 4]) {
-    let normal = glam::Vec3::from(vertex.normal).normalize();
-    let [x, y, z, u] = floats(first);
-    assert!((glam::Vec3::new(x, y, z) - normal).length() < 1e-6, "normal {normal} became {x} {y} {z}");
-    assert_eq!((u, f32::from_bits(second[0])), (vertex.u, vertex.v), "texture coordinates");
+fn check_vertex(vertex: &layout::Vertex, decoded: &[[u32; 4]]) {
+    let [normal, texcoords, tangent, color] = [0, 1, 2, 3].map(|i| floats(decoded[i]));
+    for (name, stored, [x, y, z, _]) in [("normal", vertex.normal, normal), ("tangent", vertex.tangent, tangent)] {
+        let unit = glam::Vec3::from(stored).normalize();
+        assert!((glam::Vec3::new(x, y, z) - unit).length() < 1e-6, "{name} {unit} became {x} {y} {z}");
+    }
+    assert_eq!(texcoords, [vertex.u, vertex.v, vertex.u_1, vertex.v_1], "texture coordinates");
+    assert_eq!(tangent[3], vertex.bitangent_sign, "sign of the bitangent");
+    assert_eq!(color, vertex.color, "colour");
 }

@@ -5,6 +5,7 @@ mod common;
 
 mod agreement;
 mod alpha;
+mod attributes;
 mod bsdf_chi_square;
 mod bsdf_delta;
 mod cornell;
@@ -18,6 +19,7 @@ mod mutations;
 mod sampler;
 mod shader_math;
 mod shaders_valid;
+mod shading_normals;
 mod texture;
 mod trace;
 mod watertight;

@@ -21,9 +21,8 @@ mutations! {
         "return max(wi.y, 0.0) * INV_PI;" => "return wi.y > 0.0 ? 0.5 * INV_PI : 0.0;",
         caught by "bsdf_chi_square::scattered_directions_follow_the_pdf";
     /// Light that arrives at a slant counts as much as from above.
-    missing_cosine: "path_trace.comp",
-        "bsdf_evaluate(surface.bsdf, wo, wi) * (abs(wi.y) * weight) * light.radiance" =>
-        "bsdf_evaluate(surface.bsdf, wo, wi) * weight * light.radiance",
+    missing_cosine: "include/surface.glsl",
+        "bsdf_evaluate(s.bsdf, wo, wi) * abs(wi.y)" => "bsdf_evaluate(s.bsdf, wo, wi)",
         caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
     /// The columns of the environment are drawn from the row below.
     shifted_cdf: "include/environment.glsl",
@@ -48,7 +47,7 @@ mutations! {
         caught by "bsdf_delta::refract_reflects_totally_or_not_at_all";
     /// The light sample gets the BSDF sample's weight.
     swapped_mis_weight: "path_trace.comp",
-        "weight = mis_weight(light.pdf, bsdf_density)" => "weight = mis_weight(bsdf_density, light.pdf)",
+        "weight = mis_weight(light.pdf, scattering.pdf)" => "weight = mis_weight(scattering.pdf, light.pdf)",
         caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
     /// The point on the lamp and the scattered direction from the same numbers.
     correlated_dimension: "include/rng.glsl",
@@ -95,6 +94,24 @@ mutations! {
     pick_left_out: "include/light.glsl",
         "return light_pick_probability(constants, light) / point.area" => "return 1.0 / point.area",
         caught by "light_sampling::densities_are_per_solid_angle";
+    /// Light that a normal map sends into the surface is lost.
+    absorbed_below_the_horizon: "include/surface.glsl",
+        "if (dot(drawn.wi, horizon) < 0.0) drawn.wi = other;" =>
+        "if (dot(drawn.wi, horizon) < 0.0) drawn.weight = vec3(0.0);",
+        caught by "shading_normals::no_normal_map_gains_or_loses_light";
+    /// Light samples see no more than the lobe itself.
+    unmirrored_light: "include/surface.glsl",
+        "    if (HAS_SHADING_NORMALS)\n        add_scattering(sum, s, wo, mirrored(" =>
+        "    if (false)\n        add_scattering(sum, s, wo, mirrored(",
+        caught by "shading_normals::a_tilted_map_is_a_tilted_plane";
+    /// Rays leave from the flat triangles.
+    flat_terminator: "include/shading_normal.glsl",
+        "(0.5 * weights * max(depth * side, 0.0))" => "(0.0 * weights * max(depth * side, 0.0))",
+        caught by "shading_normals::a_coarse_sphere_has_a_smooth_terminator";
+    /// A mirrored instance whose bitangent is not.
+    unmirrored_bitangent: "include/attributes.glsl",
+        "bitangent_sign = -bitangent_sign;" => "bitangent_sign = bitangent_sign;",
+        caught by "attributes::attributes_go_with_their_instance";
 }
 
 /// A call of a shader function and a render pass with the same sources read from a folder: what fails is the mutant.

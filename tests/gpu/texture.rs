@@ -4,7 +4,7 @@ use crate::common::kernel::{Random, TestKernel, empty_scene, floats};
 use glam::DAffine3;
 use sunfleck::prepare::srgb_to_linear;
 use sunfleck::scene::{
-    Filter, Image, Instance, Material, Mesh, Primitive, Scene, Texels, Texture, TextureBinding, Wrap,
+    Filter, Image, Instance, Material, Mesh, Primitive, Scene, Texels, Texture, TextureBinding, TextureTransform, Wrap,
 };
 
 const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge];
@@ -16,7 +16,18 @@ struct Case {
     wrap: [Wrap; 2],
     filter: Filter,
     srgb: bool,
+    set: usize,
+    transform: TextureTransform,
 }
+
+const PLAIN: Case = Case {
+    image: 0,
+    wrap: [Wrap::Repeat; 2],
+    filter: Filter::Linear,
+    srgb: false,
+    set: 0,
+    transform: TextureTransform::IDENTITY,
+};
 
 fn image(width: u32, height: u32, texels: Texels) -> Image {
     Image { name: String::from("test"), width, height, texels }
@@ -43,7 +54,7 @@ fn kernel(cases: &[Case]) -> TestKernel {
     for (texture, case) in cases.iter().enumerate() {
         let [wrap_u, wrap_v] = case.wrap;
         scene.textures.push(Texture { image: case.image, wrap_u, wrap_v, filter: case.filter });
-        let binding = Some(TextureBinding { texture });
+        let binding = Some(TextureBinding { texture, set: case.set, transform: case.transform });
         let (color, rough) = if case.srgb { (binding, None) } else { (None, binding) };
         scene.materials.push(Material {
             base_color_texture: color,
@@ -64,8 +75,18 @@ fn kernel(cases: &[Case]) -> TestKernel {
 }
 
 fn sample(kernel: &TestKernel, at: &[(usize, [f32; 2])]) -> Vec<[f64; 4]> {
-    let inputs: Vec<[u32; 4]> = at.iter().map(|(case, [u, v])| [u.to_bits(), v.to_bits(), *case as u32, 0]).collect();
-    kernel.run(&inputs, inputs.len(), 1).into_iter().map(|t| floats(t).map(f64::from)).collect()
+    // Only the first set is looked up: the second is where nothing is right.
+    let inputs: Vec<_> = at.iter().map(|&(case, uv)| (case, uv, [f32::NAN; 2])).collect();
+    sample_sets(kernel, &inputs)
+}
+
+/// By coordinates of both sets.
+fn sample_sets(kernel: &TestKernel, at: &[(usize, [f32; 2], [f32; 2])]) -> Vec<[f64; 4]> {
+    let input = |(case, [u, v], [u_1, v_1]): &(usize, [f32; 2], [f32; 2])| {
+        [[u.to_bits(), v.to_bits(), *case as u32, 0], [u_1.to_bits(), v_1.to_bits(), 0, 0]]
+    };
+    let inputs: Vec<[u32; 4]> = at.iter().flat_map(input).collect();
+    kernel.run(&inputs, at.len(), 1).into_iter().map(|t| floats(t).map(f64::from)).collect()
 }
 
 /// glTF 2.0, §3.8.4.
@@ -95,8 +116,9 @@ fn texel(image: &Image, case: &Case, x: i64, y: i64) -> [f64; 4] {
 }
 
 /// The exact lookup, and how near the coordinate is to where the nearest texel changes (in texels).
-fn lookup(image: &Image, case: &Case, [u, v]: [f32; 2]) -> ([f64; 4], f64) {
-    let (x, y) = (f64::from(u) * f64::from(image.width), f64::from(v) * f64::from(image.height));
+fn lookup(image: &Image, case: &Case, uv: [f32; 2]) -> ([f64; 4], f64) {
+    let [u, v] = case.transform.apply(uv.map(f64::from));
+    let (x, y) = (u * f64::from(image.width), v * f64::from(image.height));
     if case.filter == Filter::Nearest {
         let border = |x: f64| (x - x.round()).abs();
         return (texel(image, case, x.floor() as i64, y.floor() as i64), border(x).min(border(y)));
@@ -117,7 +139,7 @@ fn filters_and_wrap_modes_are_exact() {
         for (i, wrap_u) in WRAPS.into_iter().enumerate() {
             for filter in [Filter::Nearest, Filter::Linear] {
                 for srgb in [false, true] {
-                    cases.push(Case { image, wrap: [wrap_u, WRAPS[(i + image) % 3]], filter, srgb });
+                    cases.push(Case { image, wrap: [wrap_u, WRAPS[(i + image) % 3]], filter, srgb, ..PLAIN });
                 }
             }
         }
@@ -151,9 +173,45 @@ fn filters_and_wrap_modes_are_exact() {
     assert!(at.iter().zip(&results).any(differs));
 }
 
+/// KHR_texture_transform on either set, against the transform in f64.
+#[test]
+fn transforms_and_sets_are_exact() {
+    let mut random = Random(33);
+    let mut number = |low, high| random.between(low, high);
+    let mut cases = Vec::new();
+    for i in 0..24 {
+        let offset = [number(-2.0, 2.0), number(-2.0, 2.0)];
+        let transform = TextureTransform::new(offset, number(-4.0, 4.0), [number(-3.0, 3.0), number(-3.0, 3.0)]);
+        cases.push(Case { image: i % 3, wrap: [WRAPS[i % 3], WRAPS[i / 3 % 3]], set: i % 2, transform, ..PLAIN });
+    }
+    // The same image and sampler on another set, or under another transform, is another texture.
+    cases.push(Case { set: 1, ..PLAIN });
+    cases.push(PLAIN);
+    let mut coordinates = || [0; 2].map(|_| number(-2.0, 2.0) as f32);
+    let at: Vec<_> = (0..cases.len())
+        .flat_map(|case| (0..64).map(move |_| case))
+        .map(|case| (case, coordinates(), coordinates()))
+        .collect();
+    let images = images();
+    let mut swapped = 0.0_f64;
+    for ((case, first, second), result) in at.iter().zip(sample_sets(&kernel(&cases), &at)) {
+        let case = &cases[*case];
+        let sets = [*first, *second];
+        let (expected, _) = lookup(&images[case.image], case, sets[case.set]);
+        let (other, _) = lookup(&images[case.image], case, sets[1 - case.set]);
+        for channel in 0..4 {
+            // Coordinates of up to 14, in 8 texels of contrast 1, are known to 2^-20 each.
+            let error = (result[channel] - expected[channel]).abs();
+            assert!(error < 1e-4, "{case:?} at {sets:?}: {result:?} instead of {expected:?}");
+            swapped = swapped.max((result[channel] - other[channel]).abs());
+        }
+    }
+    assert!(swapped > 0.1, "the comparison sees the wrong set");
+}
+
 #[test]
 fn all_srgb_codes_are_decoded() {
-    let case = Case { image: 4, wrap: [Wrap::Repeat; 2], filter: Filter::Nearest, srgb: true };
+    let case = Case { image: 4, filter: Filter::Nearest, srgb: true, ..PLAIN };
     let at: Vec<(usize, [f32; 2])> = (0..256).map(|i| (0, [(i as f32 + 0.5) / 256.0, 0.5])).collect();
     let mut worst = 0.0_f64;
     for (code, result) in sample(&kernel(&[case]), &at).iter().enumerate() {
@@ -172,7 +230,7 @@ fn all_srgb_codes_are_decoded() {
 #[test]
 fn wild_coordinates_are_harmless() {
     let filters = [Filter::Nearest, Filter::Linear];
-    let case = |wrap| filters.map(|filter| Case { image: 0, wrap: [wrap; 2], filter, srgb: false });
+    let case = |wrap| filters.map(|filter| Case { wrap: [wrap; 2], filter, ..PLAIN });
     let cases: Vec<Case> = WRAPS.into_iter().flat_map(case).collect();
     let wild = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -f32::MAX, 1e10, -3e9, 1e-40, -0.0, -1e-30];
     let at: Vec<(usize, [f32; 2])> = (0..cases.len())

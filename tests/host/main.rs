@@ -16,6 +16,7 @@ mod prepare_geometry;
 mod prepare_lights;
 mod prepare_support;
 mod scene_assets;
+mod scene_attributes;
 mod scene_bad_input;
 mod scene_gltf;
 mod scene_obj;

@@ -19,7 +19,7 @@ fn prepared_with(mut material: Material, texels: Option<Texels>) -> Prepared {
         scene.images.push(Image { name: String::new(), width: width as u32, height: 1, texels });
         let (wrap_u, wrap_v) = (Wrap::Repeat, Wrap::Repeat);
         scene.textures.push(Texture { image: 0, wrap_u, wrap_v, filter: Filter::Linear });
-        material.base_color_texture = Some(TextureBinding { texture: 0 });
+        material.base_color_texture = Some(TextureBinding::new(0));
     }
     scene.materials.push(material);
     let behind: Primitive = soup(&[UNIT.map(|[x, y, _]| [x, y, -1.0])], 1);

@@ -25,9 +25,13 @@ fn triangle(prepared: &Prepared, index: u32) -> Triangle {
 }
 
 fn vertex(prepared: &Prepared, index: u32) -> Vertex {
-    let first = (prepared.constants.vertices + VERTEX_TEXELS * index) as usize;
-    let texels = &prepared.arrays[SceneArray::Attributes as usize][first..first + VERTEX_TEXELS as usize];
-    *bytemuck::from_bytes(bytemuck::cast_slice(texels))
+    let stride = prepared.constants.vertex_texels;
+    let first = (prepared.constants.vertices + stride * index) as usize;
+    // Normals and texture coordinates; what a vertex is stored without stays zero.
+    let mut texels = [[0; 4]; 4];
+    let stored = stride.min(2) as usize;
+    texels[..stored].copy_from_slice(&prepared.arrays[SceneArray::Attributes as usize][first..first + stored]);
+    bytemuck::cast(texels)
 }
 
 /// A triangle with the normals of its plane.
@@ -181,7 +185,7 @@ fn attributes_are_kept_only_where_used() {
         wrap_v: Wrap::ClampToEdge,
         filter: Filter::Nearest,
     });
-    let binding = Some(TextureBinding { texture: 0 });
+    let binding = Some(TextureBinding::new(0));
     scene.materials[0] =
         Material { base_color_texture: binding, metallic_roughness_texture: binding, ..Material::default() };
     let textured = prepared(&scene);
@@ -189,8 +193,9 @@ fn attributes_are_kept_only_where_used() {
     assert_eq!((vertex(&textured, 0).u, vertex(&textured, 2).v), (0.25, 0.5));
     // One image, two headers: colours are sRGB, roughness is not.
     let tables = &textured.arrays[SceneArray::Tables as usize];
-    let headers: Vec<TextureHeader> =
-        (0..2).map(|i| bytemuck::cast(tables[textured.constants.textures as usize + i])).collect();
+    let first = textured.constants.textures as usize;
+    let end = first + 2 * TEXTURE_TEXELS as usize;
+    let headers: Vec<TextureHeader> = bytemuck::pod_collect_to_vec(&tables[first..end]);
     let common = TEXTURE_16_BIT | TEXTURE_NEAREST | 1 << TEXTURE_WRAP_U_SHIFT | 2 << TEXTURE_WRAP_V_SHIFT;
     assert_eq!((headers[0].sampling, headers[1].sampling), (common | TEXTURE_SRGB, common));
     assert_eq!((headers[0].first_word, headers[1].first_word), (0, 0));

@@ -140,7 +140,7 @@ fn textured_lamp(texcoords: Vec<[f32; 2]>, wrap: Wrap) -> Scene {
     let mut scene = scene_of(&[UNIT, UNIT], &[DAffine3::IDENTITY]);
     scene.images.push(Image { name: "glow".into(), width: 64, height: 64, texels: Texels::Rgba8(texels) });
     scene.textures.push(Texture { image: 0, wrap_u: wrap, wrap_v: wrap, filter: Filter::Linear });
-    scene.materials[0] = Material { emission_texture: Some(TextureBinding { texture: 0 }), ..emitter([1.0; 3]) };
+    scene.materials[0] = Material { emission_texture: Some(TextureBinding::new(0)), ..emitter([1.0; 3]) };
     scene.meshes[0].primitives[0].texcoords = Some(texcoords);
     scene
 }

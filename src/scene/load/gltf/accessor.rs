@@ -187,6 +187,19 @@ impl Accessor {
         Self::new(place, "VEC2", buffers)?.numeric(place)
     }
 
+    /// Four numbers an element, of any component type that KHR_mesh_quantization allows.
+    pub(super) fn vec4(place: &Json<'_>, buffers: &mut Buffers) -> SceneResult<Self> {
+        Self::new(place, "VEC4", buffers)?.numeric(place)
+    }
+
+    /// Colours: three or four numbers an element; integers are normalised whatever the accessor says.
+    pub(super) fn color(place: &Json<'_>, buffers: &mut Buffers) -> SceneResult<Self> {
+        let kind = if place.require("type")?.string()? == "VEC3" { "VEC3" } else { "VEC4" };
+        let mut accessor = Self::new(place, kind, buffers)?.numeric(place)?;
+        accessor.normalized = true;
+        Ok(accessor)
+    }
+
     fn numeric(self, place: &Json<'_>) -> SceneResult<Self> {
         match self.component {
             Component::U32 => Err(place.fail("32-bit integers are not allowed for a vertex attribute")),
@@ -222,6 +235,15 @@ impl Accessor {
             Some(bytes) => std::array::from_fn(|i| decode(bytes, i)),
             None => [0.0; N],
         }
+    }
+
+    /// Colour `index` with its alpha; 1 if it has none.
+    pub(super) fn get_color(&self, index: usize) -> [f32; 4] {
+        if self.components == 4 {
+            return self.get(index);
+        }
+        let [r, g, b] = self.get(index);
+        [r, g, b, 1.0]
     }
 
     /// Element `index` as a vertex index.

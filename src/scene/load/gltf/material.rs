@@ -6,13 +6,17 @@
 
 use super::Loader;
 use super::json::Json;
-use crate::scene::{AlphaMode, Bsdf, Fresnel, Material, SceneResult, TextureBinding};
+use crate::scene::{AlphaMode, Bsdf, Fresnel, Material, SceneResult, TextureBinding, TextureTransform};
 
 impl Loader<'_> {
-    /// The index in `Scene::materials` of a glTF material, or of the default one. Where a primitive has no texture
-    /// coordinates, textures cannot be used and the factors stand alone.
-    pub(super) fn material(&mut self, place: Option<(usize, Json<'_>)>, has_texcoords: bool) -> SceneResult<usize> {
-        let key = (place.as_ref().map(|(index, _)| *index), has_texcoords || place.is_none());
+    /// The index in `Scene::materials` of a glTF material, or of the default one. Where a primitive lacks a set of
+    /// texture coordinates, textures on it cannot be used and their factors stand alone.
+    pub(super) fn material(
+        &mut self,
+        place: Option<(usize, Json<'_>)>,
+        has_texcoords: [bool; 2],
+    ) -> SceneResult<usize> {
+        let key = (place.as_ref().map(|(index, _)| *index), if place.is_none() { [true; 2] } else { has_texcoords });
         if let Some(&known) = self.materials.get(&key) {
             return Ok(known);
         }
@@ -26,12 +30,7 @@ impl Loader<'_> {
         Ok(index)
     }
 
-    /// Whether a material of the scene reads any texture.
-    pub(super) fn is_textured(&self, material: usize) -> bool {
-        self.scene.materials[material].textures().next().is_some()
-    }
-
-    fn read_material(&mut self, place: &Json<'_>, has_texcoords: bool) -> SceneResult<Material> {
+    fn read_material(&mut self, place: &Json<'_>, has_texcoords: [bool; 2]) -> SceneResult<Material> {
         let mut material = Material {
             name: place.name(),
             double_sided: place.flag("doubleSided")?,
@@ -49,12 +48,13 @@ impl Loader<'_> {
         }
         if material.bsdf != Bsdf::Unlit {
             self.read_emission(place, &mut material, has_texcoords)?;
+            self.read_normal_map(place, &mut material, has_texcoords)?;
         }
         if material.bsdf == Bsdf::MetallicRoughness {
             self.read_specular(place, &mut material, has_texcoords)?;
             self.read_transmission(place, &mut material, has_texcoords)?;
         }
-        self.warn_of_material(place, &material)?;
+        self.warn_of_material(place)?;
         Ok(material)
     }
 
@@ -80,7 +80,7 @@ impl Loader<'_> {
         &mut self,
         pbr: &Json<'_>,
         material: &mut Material,
-        has_texcoords: bool,
+        has_texcoords: [bool; 2],
     ) -> SceneResult<()> {
         if let Some(place) = pbr.get("baseColorFactor")? {
             for component in place.elements()? {
@@ -104,7 +104,12 @@ impl Loader<'_> {
         Ok(())
     }
 
-    fn read_emission(&mut self, place: &Json<'_>, material: &mut Material, has_texcoords: bool) -> SceneResult<()> {
+    fn read_emission(
+        &mut self,
+        place: &Json<'_>,
+        material: &mut Material,
+        has_texcoords: [bool; 2],
+    ) -> SceneResult<()> {
         let factor = place.color("emissiveFactor", [0.0; 3], f64::MAX)?;
         let strength = match place.extension("KHR_materials_emissive_strength")? {
             Some(extension) => extension.number_in("emissiveStrength", 1.0, 0.0, f64::MAX)?,
@@ -120,6 +125,23 @@ impl Loader<'_> {
         Ok(())
     }
 
+    fn read_normal_map(
+        &mut self,
+        place: &Json<'_>,
+        material: &mut Material,
+        has_texcoords: [bool; 2],
+    ) -> SceneResult<()> {
+        let Some(info) = place.get("normalTexture")? else { return Ok(()) };
+        material.normal_scale = info.number_or("scale", 1.0)? as f32;
+        if !material.normal_scale.is_finite() {
+            return Err(info.fail("the scale is too large for a 32-bit float"));
+        }
+        if material.normal_scale != 0.0 {
+            material.normal_texture = self.texture(Some(info), has_texcoords)?;
+        }
+        Ok(())
+    }
+
     fn index_of_refraction(&mut self, place: &Json<'_>) -> SceneResult<f32> {
         let Some(extension) = place.extension("KHR_materials_ior")? else { return Ok(1.5) };
         let ior = extension.number_in("ior", 1.5, 0.0, f64::from(f32::MAX))? as f32;
@@ -131,7 +153,12 @@ impl Loader<'_> {
         Ok(1.5)
     }
 
-    fn read_specular(&mut self, place: &Json<'_>, material: &mut Material, has_texcoords: bool) -> SceneResult<()> {
+    fn read_specular(
+        &mut self,
+        place: &Json<'_>,
+        material: &mut Material,
+        has_texcoords: [bool; 2],
+    ) -> SceneResult<()> {
         let Some(extension) = place.extension("KHR_materials_specular")? else { return Ok(()) };
         material.specular = extension.number_in("specularFactor", 1.0, 0.0, 1.0)? as f32;
         material.specular_color =
@@ -144,7 +171,12 @@ impl Loader<'_> {
     }
 
     /// KHR_materials_transmission is thin-walled; only a volume would make it solid.
-    fn read_transmission(&mut self, place: &Json<'_>, material: &mut Material, has_texcoords: bool) -> SceneResult<()> {
+    fn read_transmission(
+        &mut self,
+        place: &Json<'_>,
+        material: &mut Material,
+        has_texcoords: [bool; 2],
+    ) -> SceneResult<()> {
         let Some(extension) = place.extension("KHR_materials_transmission")? else { return Ok(()) };
         material.transmission = extension.number_in("transmissionFactor", 0.0, 0.0, 1.0)? as f32;
         if material.transmission > 0.0 {
@@ -159,11 +191,7 @@ impl Loader<'_> {
     }
 
     /// Names the features of a material that are not covered. Occlusion textures are no part of a path tracer.
-    fn warn_of_material(&mut self, place: &Json<'_>, material: &Material) -> SceneResult<()> {
-        if material.bsdf != Bsdf::Unlit && place.get("normalTexture")?.is_some() {
-            let subject = "normal textures are not supported yet: the interpolated normal is used";
-            self.warnings.add(subject, &place.pointer);
-        }
+    fn warn_of_material(&mut self, place: &Json<'_>) -> SceneResult<()> {
         let volume_was_named = self.warnings.has("KHR_materials_volume ");
         for name in place.extension_names()? {
             let known = super::SUPPORTED.contains(&name.as_str()) || super::INVISIBLE.contains(&name.as_str());
@@ -177,25 +205,44 @@ impl Loader<'_> {
     }
 
     /// The binding of a texture info object; `None` if there is none or it cannot be honoured.
-    fn texture(&mut self, info: Option<Json<'_>>, has_texcoords: bool) -> SceneResult<Option<TextureBinding>> {
+    fn texture(&mut self, info: Option<Json<'_>>, has_texcoords: [bool; 2]) -> SceneResult<Option<TextureBinding>> {
         let Some(info) = info else { return Ok(None) };
-        if info.extension("KHR_texture_transform")?.is_some() {
-            let subject = "KHR_texture_transform is not supported yet: textures are shown untransformed";
-            self.warnings.add(subject, &info.pointer);
-        }
+        let extension = info.extension("KHR_texture_transform")?;
         let (index, place) = info.require("index")?.refer("textures")?;
-        if info.unsigned_or("texCoord", 0)? != 0 {
-            let subject = "textures on TEXCOORD_1 and higher are not supported yet: their factor alone is used";
-            self.warnings.add(subject, &info.pointer);
-            return Ok(None);
+        let own_set = info.unsigned_or("texCoord", 0)?;
+        let set = extension.as_ref().map_or(Ok(own_set), |extension| extension.unsigned_or("texCoord", own_set))?;
+        match has_texcoords.get(set) {
+            Some(true) => {}
+            Some(false) => {
+                let subject =
+                    format!("textures on meshes without TEXCOORD_{set} cannot be shown: their factor alone is used");
+                self.warnings.add(subject, &info.pointer);
+                return Ok(None);
+            }
+            None => {
+                let subject = "textures on TEXCOORD_2 and higher are not supported yet: their factor alone is used";
+                self.warnings.add(subject, &info.pointer);
+                return Ok(None);
+            }
         }
-        if !has_texcoords {
-            let subject = "textures on meshes without TEXCOORD_0 cannot be shown: their factor alone is used";
-            self.warnings.add(subject, &info.pointer);
-            return Ok(None);
-        }
+        let transform = extension.map_or(Ok(TextureTransform::IDENTITY), |extension| read_transform(&extension))?;
         let texture = self.load_texture(index, &place)?;
-        Ok(Some(TextureBinding { texture }))
+        Ok(Some(TextureBinding { texture, set, transform }))
+    }
+}
+
+/// KHR_texture_transform.
+fn read_transform(extension: &Json<'_>) -> SceneResult<TextureTransform> {
+    let pair = |key: &str, default: [f64; 2]| extension.get(key)?.map_or(Ok(default), |place| place.numbers::<2>());
+    let transform = TextureTransform::new(
+        pair("offset", [0.0; 2])?,
+        extension.number_or("rotation", 0.0)?,
+        pair("scale", [1.0; 2])?,
+    );
+    if transform.rows.iter().flatten().all(|x| x.is_finite()) {
+        Ok(transform)
+    } else {
+        Err(extension.fail("the texture transform is too large for a 32-bit float"))
     }
 }
 

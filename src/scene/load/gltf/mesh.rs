@@ -2,6 +2,7 @@
 
 use super::Loader;
 use super::accessor::Accessor;
+use super::attributes::AttributeReader;
 use super::json::Json;
 use crate::scene::{Mesh, Primitive, SceneResult};
 
@@ -48,19 +49,35 @@ impl Loader<'_> {
         if triangles.is_empty() {
             return Ok(None);
         }
-        self.warn_of_attributes(place, &attributes)?;
+        self.warn_of_attributes(place)?;
 
-        let has_texcoords = attributes.get("TEXCOORD_0")?.is_some();
+        let has_texcoords = [attributes.get("TEXCOORD_0")?.is_some(), attributes.get("TEXCOORD_1")?.is_some()];
         let material = self.material(place.refer_by("material", "materials")?, has_texcoords)?;
-        let texcoords =
-            if self.is_textured(material) { self.texcoords(&attributes, &positions, &vertices)? } else { None };
-        Ok(Some(Primitive {
+        let reader = AttributeReader { attributes: &attributes, positions: &positions, vertices: &vertices };
+        let mut primitive = Primitive {
             positions: finite_positions(&positions, &positions_place, &vertices)?,
-            normals: self.normals(&attributes, &positions, &vertices)?,
-            texcoords,
+            normals: reader.normals(self)?,
+            colors: reader.colors(self)?,
             triangles,
             material,
-        }))
+            ..Primitive::default()
+        };
+        let tangents = self.scene.materials[material].tangent_coordinates();
+        let [first, second] = self.scene.materials[material].texcoord_sets();
+        if first || tangents.is_some_and(|(set, _)| set == 0) {
+            primitive.texcoords = reader.texcoords(self, "TEXCOORD_0")?;
+        }
+        if second {
+            primitive.texcoords_1 = reader.texcoords(self, "TEXCOORD_1")?;
+        }
+        if let Some((set, transform)) = tangents {
+            // Without normals a file's tangents are to be ignored (glTF 2.0, section 3.7.2.1).
+            primitive.tangents = if primitive.normals.is_some() { reader.tangents(self)? } else { None };
+            if primitive.tangents.is_none() {
+                primitive.generate_tangents(set, &transform);
+            }
+        }
+        Ok(Some(primitive))
     }
 
     /// The primitive's topology; `None` for points and lines.
@@ -96,58 +113,12 @@ impl Loader<'_> {
         }
     }
 
-    fn warn_of_attributes(&mut self, place: &Json<'_>, attributes: &Json<'_>) -> SceneResult<()> {
-        if attributes.get("COLOR_0")?.is_some() {
-            self.warnings.add("vertex colours (COLOR_0) are not supported yet and ignored", &place.pointer);
-        }
+    fn warn_of_attributes(&mut self, place: &Json<'_>) -> SceneResult<()> {
         if !place.list("targets")?.is_empty() {
             self.warnings.add("morph targets are not supported yet: meshes are shown unmorphed", &place.pointer);
         }
-        self.warn_of_extensions(place)?;
-        Ok(())
+        self.warn_of_extensions(place)
     }
-
-    /// Unit normals of the used vertices; `None` (flat shading) without them or if one of them cannot be normalised.
-    fn normals(
-        &mut self,
-        attributes: &Json<'_>,
-        positions: &Accessor,
-        vertices: &[u32],
-    ) -> SceneResult<Option<Vec<[f32; 3]>>> {
-        let Some((_, place)) = attributes.refer_by("NORMAL", "accessors")? else { return Ok(None) };
-        let accessor = Accessor::vec3(&place, &mut self.buffers)?;
-        same_count(&accessor, &place, positions)?;
-        let normals: Option<Vec<[f32; 3]>> = vertices.iter().map(|&v| unit(accessor.get(v as usize))).collect();
-        if normals.is_none() {
-            self.warnings.add("normals of zero length or NaN: those meshes are shaded flat", &place.pointer);
-        }
-        Ok(normals)
-    }
-
-    fn texcoords(
-        &mut self,
-        attributes: &Json<'_>,
-        positions: &Accessor,
-        vertices: &[u32],
-    ) -> SceneResult<Option<Vec<[f32; 2]>>> {
-        let Some((_, place)) = attributes.refer_by("TEXCOORD_0", "accessors")? else { return Ok(None) };
-        let accessor = Accessor::vec2(&place, &mut self.buffers)?;
-        same_count(&accessor, &place, positions)?;
-        let mut texcoords: Vec<[f32; 2]> = vertices.iter().map(|&v| accessor.get(v as usize)).collect();
-        for texcoord in texcoords.iter_mut().filter(|texcoord| !texcoord.iter().all(|x| x.is_finite())) {
-            *texcoord = [0.0; 2];
-            self.warnings.add("texture coordinates that are NaN or infinite were set to 0", &place.pointer);
-        }
-        Ok(Some(texcoords))
-    }
-}
-
-fn same_count(accessor: &Accessor, place: &Json<'_>, positions: &Accessor) -> SceneResult<()> {
-    if accessor.count() == positions.count() {
-        return Ok(());
-    }
-    let message = format!("{} elements, but POSITION has {}", accessor.count(), positions.count());
-    Err(place.fail(message).hint("all attributes of a primitive must have the same count: export the file again"))
 }
 
 fn finite_positions(accessor: &Accessor, place: &Json<'_>, vertices: &[u32]) -> SceneResult<Vec<[f32; 3]>> {
@@ -160,12 +131,6 @@ fn finite_positions(accessor: &Accessor, place: &Json<'_>, vertices: &[u32]) -> 
             Err(place.fail(message).hint("positions must be finite: repair the mesh and export it again"))
         }
     }
-}
-
-/// The vector at unit length, if it has a direction. In f64, where squares of f32 neither overflow nor vanish.
-fn unit(vector: [f32; 3]) -> Option<[f32; 3]> {
-    let vector = glam::DVec3::from(vector.map(f64::from));
-    vector.try_normalize().map(|unit| unit.to_array().map(|x| x as f32))
 }
 
 /// Vertices in drawing order to triangles (glTF 2.0 section 3.7.2.1). Triangles with a vertex twice have no area and are

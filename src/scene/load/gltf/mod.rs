@@ -8,11 +8,12 @@
 //! - Triangles, strips and fans; points and lines have no surface and are skipped with a warning.
 //! - Extensions: KHR_lights_punctual (a light's `range` is ignored: light falls off by the square of the distance, to
 //!   infinity), KHR_materials_emissive_strength, _ior, _specular, _unlit, _transmission (thin-walled), KHR_mesh_quantization,
-//!   EXT_texture_webp; KHR_materials_variants shows its default.
+//!   KHR_texture_transform, EXT_texture_webp; KHR_materials_variants shows its default.
 //! - Extras: `sunfleck` on a material (`material.rs`), a camera (`camera.rs`) and a scene (`extras.rs`).
 //! - Everything else that changes the picture is named in [`Scene::warnings`]; if the file requires it, it is an error.
 
 mod accessor;
+mod attributes;
 mod buffer;
 mod camera;
 mod extras;
@@ -44,6 +45,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_unlit",
     "KHR_materials_variants",
     "KHR_mesh_quantization",
+    "KHR_texture_transform",
     "EXT_texture_webp",
 ];
 
@@ -68,8 +70,8 @@ struct Loader<'a> {
     scene: Scene,
     /// glTF mesh to `Scene::meshes`, for meshes that have triangles.
     meshes: HashMap<usize, Option<usize>>,
-    /// glTF material, and whether its textures can be used, to `Scene::materials`.
-    materials: HashMap<(Option<usize>, bool), usize>,
+    /// glTF material, and which sets of texture coordinates its textures can use, to `Scene::materials`.
+    materials: HashMap<(Option<usize>, [bool; 2]), usize>,
     /// glTF texture to `Scene::textures`.
     textures: HashMap<usize, usize>,
     /// glTF image to its place among the pending ones.

@@ -45,7 +45,7 @@ impl Textures {
     /// The texture of an image.
     pub(super) fn bind(&mut self, source: Source) -> TextureBinding {
         if let Some(&texture) = self.known.get(&source) {
-            return TextureBinding { texture };
+            return TextureBinding::new(texture);
         }
         let wrap = source.first().map(|texture| texture.wrap).unwrap_or_default();
         let same_image =
@@ -56,7 +56,7 @@ impl Textures {
         });
         self.textures.push(Texture { image, wrap_u: wrap, wrap_v: wrap, filter: Filter::Linear });
         self.known.insert(source, self.textures.len() - 1);
-        TextureBinding { texture: self.textures.len() - 1 }
+        TextureBinding::new(self.textures.len() - 1)
     }
 
     /// The textures, and what the images they index are made of, to be decoded in this order.
