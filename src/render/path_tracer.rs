@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::ops::{ControlFlow, Range};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -237,7 +238,7 @@ fn build_kernel(
     constants: &Buffer,
     slices: &[Slice],
 ) -> Result<Kernel> {
-    let spirv = kernel_spirv(key, settings)?;
+    let spirv = kernel_spirv(gpu, key, settings)?;
     let arrays = buffers.bindings();
     let array_binding = array_binding(buffers, key.array_form, &arrays);
     let sets: Vec<Vec<BindingResource<'_>>> = slices
@@ -268,15 +269,29 @@ fn build_kernel(
     )?)
 }
 
-/// The embedded variant, or one compiled from `--shaders`.
-fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
-    let Some(folder) = &settings.shaders_dir else {
+/// The embedded variant, or one compiled from `--shaders`; on a driver that compiles what specialisation leaves dead, one
+/// compiled for this key alone.
+fn kernel_spirv(gpu: &Gpu, key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
+    let for_this_key = gpu.info.compiles_dead_code;
+    if settings.shaders_dir.is_none() && !for_this_key {
         let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
         return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
+    }
+    let sources = match &settings.shaders_dir {
+        Some(folder) => {
+            shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?
+        }
+        None => embedded::SOURCES.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect(),
     };
-    let sources = shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
-    let defines =
-        [("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
+    let constants = if for_this_key { key.specialization() } else { Vec::new() };
+    let names: Vec<String> = constants.iter().map(|(id, _)| format!("SPECIALIZED_{id}")).collect();
+    let mut defines =
+        vec![("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
+    if for_this_key {
+        defines.push(("SPECIALIZED", String::from("1")));
+    }
+    defines.extend(names.iter().zip(&constants).map(|(name, (_, value))| (name.as_str(), format!("{value}u"))));
+    let folder = settings.shaders_dir.as_deref().unwrap_or(Path::new("shaders"));
     shader_compiler::compile(&sources, "path_trace.comp", &defines, true)
         .map_err(|e| Error::input(folder, e.to_string()))
 }
