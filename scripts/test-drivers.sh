@@ -14,10 +14,11 @@ scripts/drivers.sh
 
 # These test binaries touch a device; the others need no repetition, nor does the arithmetic of `bench`. The stress suite takes
 # a run of its own: scripts/test-drivers.sh --test stress. The short form leaves out what is no driver's doing: the arithmetic
-# of the error estimate, which the host does, and the deliberate bugs: that a test notices one is shown on one driver.
+# of the error estimate, which the host does, the agreement of estimators, and the deliberate bugs: that a test notices one is
+# shown on one driver.
 default=(--test gpu --test cli -- --skip bench::)
 form=${SUNFLECK_DRIVERS_FORM:-full}
-[ "$form" != short ] || default+=(--skip error_estimate --skip mutations)
+[ "$form" != short ] || default+=(--skip error_estimate --skip mutations --skip agreement)
 cargo test --quiet --no-run "${@:-${default[@]}}"
 
 # Whether the device that is taken by default is lavapipe, and its library the one that drivers.sh fetched as mesa-22.
@@ -30,9 +31,7 @@ is_system_driver() {
 }
 
 # What a run's `cargo test` gets: the caller's arguments, or the default. Tests of single shader functions, and the
-# command line's, know nothing of how rays are traced: on lavapipe 25 they run once, with the BVH. Nor do the estimators that
-# must agree: the short form compares them on lavapipe alone (SwiftShader compiles each of their kernels for some 20 s, and
-# ray queries of a software driver are slow on their meshes).
+# command line's, know nothing of how rays are traced: on lavapipe 25 they run once, with the BVH.
 arguments_of() {
     if [ $# -gt 1 ]; then
         printf '%s\n' "${@:2}"
@@ -42,7 +41,6 @@ arguments_of() {
         printf -- '--skip\n%s\n' bsdf_ environment_chi_square layout light_sampling sampler shader_math shaders_valid texture::
     else
         printf '%s\n' "${default[@]}"
-        [ "$form" != short ] || [ "$1" != swiftshader ] || printf -- '--skip\n%s\n' agreement
     fi
 }
 
