@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use crate::common::builder::{camera, mean, rectangle, scene};
 use crate::common::gpu;
+use crate::common::irradiance::polygon_irradiance;
 use crate::common::scenes::short_form;
 use crate::common::statistics::{Estimate, sidak};
 use glam::{DAffine3, DVec3};
@@ -143,17 +144,6 @@ fn shadow_rays_pass_as_path_rays_do() {
             assert_is(&format!("{layers} sheets, camera at {camera_height}, {mode}"), &red, exact, exact * 1.05, 8);
         }
     }
-}
-
-/// Irradiance from a polygon of radiance 1 above the horizon of a point (Lambert 1760; Arvo 1994, §2.2).
-fn polygon_irradiance(polygon: &[DVec3], point: DVec3, normal: DVec3) -> f64 {
-    let unit: Vec<DVec3> = polygon.iter().map(|v| (*v - point).normalize()).collect();
-    let edge = |i: usize| {
-        let (a, b) = (unit[i], unit[(i + 1) % unit.len()]);
-        let cross = a.cross(b);
-        cross.length().atan2(a.dot(b)) * cross.normalize().dot(normal)
-    };
-    0.5 * (0..unit.len()).map(edge).sum::<f64>().abs()
 }
 
 /// A lamp of 2 × 1.2 at y = 1.5 over a floor, seen at a point of the floor that a pencil of rays from below the lamp meets.

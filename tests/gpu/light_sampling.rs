@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use crate::common::irradiance::polygon_irradiance;
 use crate::common::kernel::{Random, TestKernel, empty_scene, floats, vector, vector_texel};
 use crate::common::statistics::{Estimate, chi_square_test, normal_upper_tail, sidak};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -235,18 +236,7 @@ fn densities_are_per_solid_angle() {
     }
 }
 
-/// Irradiance at a point from a polygon of radiance 1 that lies above the point's horizon (Lambert 1760; Arvo 1994, §2.2).
-fn polygon_irradiance(polygon: &[DVec3], point: DVec3, normal: DVec3) -> f64 {
-    let unit: Vec<DVec3> = polygon.iter().map(|v| (*v - point).normalize()).collect();
-    let edge = |i: usize| {
-        let (a, b) = (unit[i], unit[(i + 1) % unit.len()]);
-        let cross = a.cross(b);
-        cross.length().atan2(a.dot(b)) * cross.normalize().dot(normal)
-    };
-    0.5 * (0..unit.len()).map(edge).sum::<f64>().abs()
-}
-
-/// The same of all triangles that turn their front to the point, or of all that emit to both sides.
+/// Irradiance of all triangles that turn their front to the point, or of all that emit to both sides.
 fn analytic_irradiance(kernel: &TestKernel, point: DVec3, normal: DVec3, double_sided: bool) -> f64 {
     let lights = world_lights(kernel).into_iter();
     let faces = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).dot(point - *a) > 0.0;
