@@ -17,7 +17,7 @@ pub(super) struct MtlTexture {
     /// `-bm`, which scales normals.
     pub(super) scale: f32,
     /// Where it was named: the library and the line.
-    pub(super) library: PathBuf,
+    pub(super) mtl_file: PathBuf,
     pub(super) line: usize,
 }
 
@@ -228,6 +228,6 @@ impl Place<'_> {
             let subject = "a texture statement without a file name is ignored";
             warnings.add(subject, format!("{} line {}", self.path.display(), self.line));
         }
-        file.map(|file| MtlTexture { file, wrap, scale, library: self.path.to_owned(), line: self.line })
+        file.map(|file| MtlTexture { file, wrap, scale, mtl_file: self.path.to_owned(), line: self.line })
     }
 }

@@ -114,7 +114,7 @@ pub(super) fn decode(source: &Source) -> SceneResult<Image> {
 
 fn read(texture: &MtlTexture) -> SceneResult<Image> {
     let name = texture.file.display().to_string();
-    let fail = |message: String| at_line(&texture.library, texture.line, format!("the image {name}: {message}"));
+    let fail = |message: String| at_line(&texture.mtl_file, texture.line, format!("the image {name}: {message}"));
     let bytes = file::read(&texture.file)
         .map_err(|error| fail(error.message).hint("put the file there, or remove the line"))?;
     decode_texture(&name, &bytes).map_err(|message| fail(message).hint("replace it by a whole PNG, JPEG or WebP file"))
