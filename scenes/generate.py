@@ -54,8 +54,8 @@ class Scene:
         return len(self.doc["accessors"]) - 1
 
     def material(self, name, color=(1, 1, 1), extras=None, emission=None, metallic=None, roughness=None, ior=None,
-                 double_sided=False, texture=None, alpha=None, cutoff=None):
-        """`alpha` makes it BLEND, `cutoff` MASK."""
+                 double_sided=False, texture=None, alpha=None, cutoff=None, transmission=None, attenuation=None):
+        """`alpha` makes it BLEND, `cutoff` MASK; `attenuation` makes it a volume: a colour and the distance for it."""
         factor = [*color, 1 if alpha is None else alpha]
         material = {"name": name, "pbrMetallicRoughness": {"baseColorFactor": factor}}
         if alpha is not None:
@@ -77,6 +77,14 @@ class Scene:
                 extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
         if ior is not None:
             extensions["KHR_materials_ior"] = {"ior": ior}
+        if transmission is not None:
+            extensions["KHR_materials_transmission"] = {"transmissionFactor": transmission}
+        if attenuation is not None:
+            color, distance = attenuation
+            volume = {"thicknessFactor": 1}
+            if distance is not None:
+                volume.update(attenuationColor=list(color), attenuationDistance=distance)
+            extensions["KHR_materials_volume"] = volume
         if extensions:
             material["extensions"] = extensions
             self.use(*extensions)
@@ -429,6 +437,40 @@ def metallic_roughness():
     scene.write("metallic_roughness")
 
 
+CLEAR = ((1, 1, 1), None)
+
+
+def volumes():
+    """Solid glass, smooth and rough, that absorbs, with water and with a lamp in it; a thin wall beside it."""
+    scene = Scene()
+    scene.environment((0.35, 0.4, 0.5))
+    lamp(scene, 1.5, 4.0, (8, 7.5, 7))
+    tiles = scene.texture(checker_png(16, (60, 60, 70), (200, 195, 185)))
+    scene.place("floor", floor(5, -0.5, 8), scene.diffuse("floor", (1, 1, 1), texture=tiles))
+    ball, inner, bulb = sphere(4, 0.5), sphere(3, 0.38), sphere(2, 0.12)
+
+    def glass(name, roughness=0.0, ior=1.5, color=(1, 1, 1), transmission=1, attenuation=CLEAR):
+        return scene.material(name, color, metallic=0, roughness=roughness, ior=ior, transmission=transmission,
+                              attenuation=attenuation)
+
+    clear = glass("clear glass")
+    amber = ((0.9, 0.45, 0.1), 0.4)
+    row = [clear, glass("frosted glass", 0.45), glass("amber", attenuation=amber),
+           glass("frosted amber", 0.3, attenuation=amber), glass("half of it milky", 0.35, 1.6, (0.3, 0.6, 0.9), 0.5)]
+    for i, material in enumerate(row):
+        scene.place(scene.doc["materials"][material]["name"], ball, material, translation=[1.15 * (i - 2), 0, 0])
+    scene.place("glass of water", ball, clear, translation=[-1.2, 0, 1.3])
+    scene.place("water", inner, glass("water", ior=1.33, attenuation=((0.5, 0.8, 0.9), 0.5)), translation=[-1.2, 0, 1.3])
+    # What lies in a medium is lit through it.
+    scene.place("lamp glass", ball, glass("smoke", 0.2, 1.3, attenuation=((0.6, 0.55, 0.5), 0.5)), translation=[0, 0, 1.3])
+    scene.place("bulb", bulb, scene.diffuse("bulb", (0, 0, 0), emission=(30, 26, 20)), translation=[0, 0.2, 1.3])
+    scene.place("pearl", bulb, scene.diffuse("pearl", (0.9, 0.9, 0.9)), translation=[0.05, -0.2, 1.35])
+    thin = scene.material("thin wall", (0.9, 1, 0.9), metallic=0, roughness=0.25, transmission=1)
+    scene.place("thin wall", ball, thin, translation=[1.2, 0, 1.3])
+    scene.camera((0, 2.2, 5.6), (0, -0.05, 0.4), 36)
+    scene.write("volumes")
+
+
 def many_lights():
     scene = Scene()
     scene.place("floor", floor(4), scene.diffuse("floor", (0.7, 0.7, 0.7)))
@@ -468,5 +510,6 @@ if __name__ == "__main__":
     textured()
     alpha()
     metallic_roughness()
+    volumes()
     many_lights()
     caustic()

@@ -39,6 +39,7 @@ void start_sample(inout LaneState lane) {
     lane.radiance_scale = 1.0;
     lane.pdf = 0.0;
     lane.emission_weight = WEIGHT_FULL;
+    if (HAS_VOLUME) lane.media = OUTSIDE;
     vec4 u = to_unit(sample_bits(sample_key(lane), 0u, DIMENSIONS_FILM));
     CameraRay camera = camera_ray(constants, uvec2(lane.pixel & 0xffffu, lane.pixel >> 16u), u);
     lane.ray = Ray(camera.origin, camera.direction, INFINITY, false, NO_TRIANGLE, NO_TRIANGLE);
@@ -101,6 +102,11 @@ bool sample_direct_light(inout LaneState lane, Surface surface, vec3 wo, Triangl
         if (LIGHT_SAMPLING == LIGHT_SAMPLING_MIS) weight = mis_weight(light.pdf, scattering.pdf);
     }
     lane.shadow_light = lane.throughput * scattering.value * weight * light.radiance;
+    if (HAS_VOLUME) {
+        Media media = surface.near;
+        if (through) media = surface.far;
+        lane.shadow_light *= transmittance(constants, media, light.distance);
+    }
     if (max_component(lane.shadow_light) <= 0.0) return false;
     TriangleId from = scattered_from(surface, triangle, light.direction, through);
     lane.ray = Ray(origin, light.direction, light.distance, true, from, light.triangle);
@@ -137,7 +143,10 @@ bool scatter(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle
     BsdfSample scattered = surface_scatter(surface, wo, u.xyz);
     bool through = (scattered.flags & SCATTERED_THROUGH) != 0u;
     lane.throughput *= scattered.weight;
-    if (through) lane.radiance_scale *= surface.bsdf.eta * surface.bsdf.eta;
+    if (through) {
+        lane.radiance_scale *= surface.bsdf.eta * surface.bsdf.eta;
+        if (HAS_VOLUME) lane.media = surface.far;
+    }
     if (max_component(lane.throughput) == 0.0 || !survives_roulette(lane, u.w)) return false;
     lane.emission_weight = scattered_emission_weight(lane, scattered);
     lane.pdf = scattered.pdf;
@@ -164,11 +173,16 @@ void follow_scattered(inout LaneState lane) {
 // A path's ray has come back: adds what it met and prepares the next ray. False if the path ends.
 bool shade(inout LaneState lane, Hit hit) {
     if (hit.triangle.slot == NONE) {
+        if (HAS_VOLUME) lane.throughput *= transmittance(constants, lane.media, INFINITY);
         add_environment(lane);
         return false;
     }
     vec3 view = -lane.ray.direction;
-    Surface surface = surface_at(constants, hit, view);
+    Surface surface = surface_at(constants, hit, view, lane.media);
+    if (HAS_VOLUME) {
+        lane.media = surface.near;
+        lane.throughput *= transmittance(constants, lane.media, hit.t);
+    }
     add_emission(lane, surface, hit.t);
     if (surface.black || lane.bounce >= constants.max_bounces) return false;
     if (lane.bounce >= BOUNCE_CAP) {

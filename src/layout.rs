@@ -227,6 +227,10 @@ pub struct Material {
 /// Nodes of the albedo table of GGX along each of its coordinates. A texel holds a node and the one after it.
 pub const GGX_ALBEDO_SIZE: u32 = 48;
 
+/// Nodes of the albedo table of rough dielectrics along its coordinates, for each side. It follows that of GGX. A texel
+/// holds a node and the three next to it along the first two coordinates, 16 bits a number.
+pub const DIELECTRIC_ALBEDO_SIZE: [u32; 3] = [40, 20, 40];
+
 /// Texels a material takes.
 pub const MATERIAL_TEXELS: u32 = 8;
 
@@ -452,4 +456,4 @@ pub struct BlockResult {
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
-pub const LANE_STATE_BYTES: usize = 208;
+pub const LANE_STATE_BYTES: usize = 224;

@@ -30,7 +30,10 @@ struct BsdfParameters {
     float specular;
     vec3 specular_color;
     bool schlick;
-    GgxAlbedo albedo;  // set by bsdf_prepare
+    bool solid;   // the boundary of a volume, not a thin wall
+    // Set by bsdf_prepare.
+    GgxAlbedo albedo;
+    float dielectric_albedo;
 };
 
 struct BsdfSample {
@@ -41,13 +44,19 @@ struct BsdfSample {
 };
 const BsdfSample ABSORBED = BsdfSample(vec3(0.0, 1.0, 0.0), vec3(0.0), 0.0, 0u);
 
+bool ggx_is_delta(BsdfParameters p) { return p.alpha.x == 0.0; }
+
+vec3 mirrored(vec3 w) { return vec3(w.x, -w.y, w.z); }
+
 #include "fresnel.glsl"
 #include "bsdf_lambertian.glsl"
 #include "bsdf_specular.glsl"
+#include "bsdf_dielectric.glsl"
 #include "bsdf_metallic_roughness.glsl"
 
 void bsdf_prepare(RenderConstants constants, inout BsdfParameters p, vec3 wo) {
     p.albedo = GgxAlbedo(1.0, 0.0);
+    p.dielectric_albedo = 1.0;
     if (HAS_BSDF(BSDF_METALLIC_ROUGHNESS) && p.kind == BSDF_METALLIC_ROUGHNESS)
         metallic_roughness_prepare(constants, p, wo);
 }
@@ -79,7 +88,9 @@ float bsdf_pdf(BsdfParameters p, vec3 wo, vec3 wi) {
 
 // Whether light that comes from the other side can be scattered by a continuous lobe.
 bool bsdf_transmits(BsdfParameters p) {
-    return HAS_TRANSMISSION && p.kind == BSDF_METALLIC_ROUGHNESS && p.transmission > 0.0 && !ggx_is_delta(p);
+    if (p.kind != BSDF_METALLIC_ROUGHNESS || p.transmission == 0.0) return false;
+    if (HAS_VOLUME && p.solid) return !dielectric_is_delta(p);
+    return HAS_TRANSMISSION && !ggx_is_delta(p);
 }
 
 // Whether light sampling can reach anything: is there a continuous lobe?

@@ -1,7 +1,11 @@
-// glTF 2.0's metallic-roughness model (specification, appendix B.3) with KHR_materials_ior, _specular, _anisotropy and
-// _transmission (thin-walled): a GGX lobe with Schlick's Fresnel term over a base that is diffuse or transmits.
+// glTF 2.0's metallic-roughness model (specification, appendix B.3) with KHR_materials_ior, _specular, _anisotropy,
+// _transmission and _volume: a GGX lobe with Schlick's Fresnel term over a base that is diffuse or transmits.
 //
 //   f = F·D·V + (1 − metallic)·color·(1 − E)·((1 − transmission)/π  or  transmission·D·V(mirrored wi)/E₁)
+//
+// Where the surface is the boundary of a volume, the share (1 − metallic)·transmission of it is bsdf_dielectric.glsl's
+// instead, and the rest is this without transmission.
+//
 //
 // E₁(wo) is the albedo of D·V alone: what one scattering keeps. The factor 1 + F0·(1 − E₁)/E₁, for the dielectric and the
 // metal each, gives back what it loses (Turquin 2019, "Practical multiple scattering compensation for microfacet models",
@@ -25,20 +29,23 @@ vec3 multiple_scattering(BsdfParameters p, vec3 f0) { return 1.0 + f0 * ((1.0 - 
 // Of the dielectric's and the metal's lobe together, each with its own factor.
 Schlick specular_term(BsdfParameters p) {
     vec3 f0 = dielectric_f0(p);
-    vec3 of_dielectric = multiple_scattering(p, f0) * (1.0 - p.metallic);
+    vec3 of_dielectric = multiple_scattering(p, f0) * (1.0 - p.metallic - dielectric_share(p));
     vec3 of_metal = multiple_scattering(p, p.color) * p.metallic;
     return Schlick(f0 * of_dielectric + p.color * of_metal, (HAS_SPECULAR ? p.specular : 1.0) * of_dielectric + of_metal);
 }
 
-bool ggx_is_delta(BsdfParameters p) { return p.alpha.x == 0.0; }
-
 bool metallic_roughness_has_continuous_lobe(BsdfParameters p) {
-    return !ggx_is_delta(p) || (p.metallic < 1.0 && p.transmission < 1.0);
+    if (p.metallic < 1.0 && p.transmission < 1.0) return true;
+    return !ggx_is_delta(p) && (dielectric_share(p) < 1.0 || !dielectric_is_delta(p));
 }
 
 // What follows from wo alone; done once a hit.
 void metallic_roughness_prepare(RenderConstants constants, inout BsdfParameters p, vec3 wo) {
     p.albedo = ggx_is_delta(p) ? GgxAlbedo(1.0, pow5(1.0 - wo.y)) : ggx_albedo(constants.ggx_albedo, wo, p.alpha);
+    if (dielectric_share(p) > 0.0 && !dielectric_is_delta(p)) {
+        uint table = constants.ggx_albedo + GGX_ALBEDO_SIZE * GGX_ALBEDO_SIZE;
+        p.dielectric_albedo = dielectric_albedo(table, wo, p.alpha, p.eta, p.specular);
+    }
 }
 
 // Albedo of a lobe.
@@ -55,58 +62,84 @@ vec3 base_albedo(BsdfParameters p) {
     return p.color * ((1.0 - p.metallic) * (1.0 - kept * multiple_scattering(p, vec3(f0)).x));
 }
 
-// Probabilities of the lobes (specular, diffuse, through): their albedos.
-vec3 lobe_probabilities(BsdfParameters p) {
+// The shares of the base that are diffuse, and that pass straight through a thin wall.
+float diffuse_share(BsdfParameters p) { return HAS_TRANSMISSION || HAS_VOLUME ? 1.0 - p.transmission : 1.0; }
+float through_share(BsdfParameters p) { return HAS_TRANSMISSION && !(HAS_VOLUME && p.solid) ? p.transmission : 0.0; }
+
+// Probabilities of the lobes (specular, diffuse, through, dielectric boundary): their albedos.
+vec4 lobe_probabilities(BsdfParameters p) {
     float base = luminance(base_albedo(p));
-    float through = HAS_TRANSMISSION ? p.transmission : 0.0;
-    vec3 weights = vec3(luminance(specular_albedo(p, specular_term(p))), base * (1.0 - through),
-                        base * through);
-    float total = weights.x + weights.y + weights.z;
-    return total > 0.0 ? weights / total : vec3(0.0);
+    vec4 weights = vec4(luminance(specular_albedo(p, specular_term(p))), base * diffuse_share(p),
+                        base * through_share(p), dielectric_share(p));
+    float total = weights.x + weights.y + weights.z + weights.w;
+    return total > 0.0 ? weights / total : vec4(0.0);
 }
 
-vec3 mirrored(vec3 w) { return vec3(w.x, -w.y, w.z); }
+// Value and density of a boundary that is a part of the material and of the samples.
+vec4 dielectric_part(BsdfParameters p, float probability, vec3 wo, vec3 wi) {
+    float share = dielectric_share(p);
+    if (share == 0.0 || dielectric_is_delta(p)) return vec4(0.0);
+    return dielectric_evaluate(p, wo, wi) * vec4(vec3(share), probability);
+}
 
 vec3 metallic_roughness_evaluate(BsdfParameters p, vec3 wo, vec3 wi) {
+    if (wi.y == 0.0) return vec3(0.0);
+    vec3 dielectric = dielectric_part(p, 0.0, wo, wi).rgb;
     if (wi.y < 0.0) {
-        if (!HAS_TRANSMISSION || ggx_is_delta(p)) return vec3(0.0);
+        if (through_share(p) == 0.0 || ggx_is_delta(p)) return dielectric;
         vec3 up = mirrored(wi);
         float lobe = ggx_distribution(normalize(wo + up), p.alpha) * ggx_visibility(wo, up, p.alpha);
-        return base_albedo(p) * (p.transmission * lobe / p.albedo.white);
+        return base_albedo(p) * (through_share(p) * lobe / p.albedo.white);
     }
-    if (wi.y == 0.0) return vec3(0.0);
-    float opaque = HAS_TRANSMISSION ? 1.0 - p.transmission : 1.0;
-    vec3 diffuse = base_albedo(p) * (opaque * INV_PI);
+    vec3 diffuse = base_albedo(p) * (diffuse_share(p) * INV_PI);
     if (ggx_is_delta(p)) return diffuse;
     vec3 h = normalize(wo + wi);
     Schlick term = specular_term(p);
     vec3 fresnel = term.f0 + (term.f90 - term.f0) * pow5(1.0 - dot(wo, h));
-    return diffuse + fresnel * (ggx_distribution(h, p.alpha) * ggx_visibility(wo, wi, p.alpha));
+    return dielectric + diffuse + fresnel * (ggx_distribution(h, p.alpha) * ggx_visibility(wo, wi, p.alpha));
 }
 
 float metallic_roughness_pdf(BsdfParameters p, vec3 wo, vec3 wi) {
-    vec3 probability = lobe_probabilities(p);
+    vec4 probability = lobe_probabilities(p);
+    if (wi.y == 0.0) return 0.0;
+    float dielectric = dielectric_part(p, probability.w, wo, wi).a;
     if (wi.y < 0.0) {
-        if (!HAS_TRANSMISSION || ggx_is_delta(p)) return 0.0;
+        if (through_share(p) == 0.0 || ggx_is_delta(p)) return dielectric;
         return probability.z * ggx_reflection_pdf(wo, normalize(wo + mirrored(wi)), p.alpha);
     }
     float diffuse = probability.y * wi.y * INV_PI;
-    if (ggx_is_delta(p) || wi.y == 0.0) return diffuse;
-    return diffuse + probability.x * ggx_reflection_pdf(wo, normalize(wo + wi), p.alpha);
+    if (ggx_is_delta(p)) return diffuse;
+    return dielectric + diffuse + probability.x * ggx_reflection_pdf(wo, normalize(wo + wi), p.alpha);
+}
+
+// A sample of the continuous lobes together, in a direction that one of them chose.
+BsdfSample metallic_roughness_sample(BsdfParameters p, vec3 wo, vec3 wi) {
+    float pdf = metallic_roughness_pdf(p, wo, wi);
+    // So close to the edge of a facet that wi's rounding is beyond it.
+    if (pdf == 0.0) return ABSORBED;
+    vec3 weight = metallic_roughness_evaluate(p, wo, wi) * (abs(wi.y) / pdf);
+    return BsdfSample(wi, weight, pdf, wi.y < 0.0 ? SCATTERED_THROUGH : 0u);
 }
 
 BsdfSample metallic_roughness_scatter(BsdfParameters p, vec3 wo, vec3 u) {
-    vec3 probability = lobe_probabilities(p);
-    if (u.x >= probability.x && (u.x < probability.x + probability.y || probability.z == 0.0)) {
-        if (probability.y == 0.0) return ABSORBED;  // black, or rounding at the end of the last lobe
-        vec3 wi = sample_cosine_hemisphere(u.yz);
-        float pdf = metallic_roughness_pdf(p, wo, wi);
-        return BsdfSample(wi, metallic_roughness_evaluate(p, wo, wi) * (wi.y / pdf), pdf, 0u);
+    vec4 probability = lobe_probabilities(p);
+    vec3 end = vec3(probability.x, probability.x + probability.y, probability.x + probability.y + probability.z);
+    bool dielectric = HAS_VOLUME && u.x >= end.z && probability.w > 0.0;
+    if (dielectric) {
+        float v = min((u.x - end.z) / probability.w, LARGEST_BELOW_1);
+        if (dielectric_is_delta(p)) return smooth_dielectric_scatter(p, wo, v, probability.w);
+        vec3 wi = rough_dielectric_direction(p, wo, vec3(v, u.yz));
+        if (wi.y == 0.0) return ABSORBED;
+        return metallic_roughness_sample(p, wo, wi);
     }
-    bool through = u.x >= probability.x;
+    if (u.x >= end.x && (u.x < end.y || probability.z == 0.0)) {
+        if (probability.y == 0.0) return ABSORBED;  // black, or rounding at the end of the last lobe
+        return metallic_roughness_sample(p, wo, sample_cosine_hemisphere(u.yz));
+    }
+    bool through = u.x >= end.x;
     if (ggx_is_delta(p)) {
         if (through)
-            return BsdfSample(-wo, base_albedo(p) * (p.transmission / probability.z), 0.0,
+            return BsdfSample(-wo, base_albedo(p) * (through_share(p) / probability.z), 0.0,
                               SCATTERED_DELTA | SCATTERED_THROUGH);
         return BsdfSample(reflect_local(wo), specular_albedo(p, specular_term(p)) / probability.x, 0.0, SCATTERED_DELTA);
     }
@@ -114,8 +147,5 @@ BsdfSample metallic_roughness_scatter(BsdfParameters p, vec3 wo, vec3 u) {
     vec3 wi = h * (2.0 * dot(wo, h)) - wo;
     // Reflected below the surface by normals that the bound did not exclude: no light comes from there.
     if (wi.y <= 0.0) return ABSORBED;
-    if (through) wi = mirrored(wi);
-    float pdf = metallic_roughness_pdf(p, wo, wi);
-    vec3 weight = metallic_roughness_evaluate(p, wo, wi) * (abs(wi.y) / pdf);
-    return BsdfSample(wi, weight, pdf, through ? SCATTERED_THROUGH : 0u);
+    return metallic_roughness_sample(p, wo, through ? mirrored(wi) : wi);
 }

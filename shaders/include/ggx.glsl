@@ -67,15 +67,20 @@ float ggx_equal_alpha(vec3 wo, vec2 alpha) {
 }
 const float ANISOTROPIC_MARGIN = 0.065;
 
-// By a table made by quadrature (tests/common/ggx_albedo.rs). Its coordinates are the polar angle φ of the direction
-// stretched by the roughness, as √tan(π/4 − φ/2), and √α: with them it is smooth down to grazing angles and the delta.
+// Coordinates of albedo tables, in [0, 1]: the polar angle φ of the direction stretched by the roughness, as
+// √tan(π/4 − φ/2), and √α. Albedos are smooth in them down to grazing angles and to the delta.
+vec2 ggx_albedo_coordinates(vec3 wo, vec2 alpha) {
+    float horizontal = sqrt(sqr(alpha.x * wo.x) + sqr(alpha.y * wo.z));
+    return sqrt(vec2(wo.y / (ggx_stretched_length(wo, alpha) + horizontal),
+                     HAS_ANISOTROPY ? ggx_equal_alpha(wo, alpha) : alpha.x));
+}
+
+// By a table made by quadrature (tests/common/ggx_albedo.rs).
 GgxAlbedo ggx_albedo(uint table, vec3 wo, vec2 alpha) {
     float stretched = ggx_stretched_length(wo, alpha);
-    float horizontal = sqrt(sqr(alpha.x * wo.x) + sqr(alpha.y * wo.z));
-    float x = sqrt(wo.y / (stretched + horizontal)) * float(GGX_ALBEDO_SIZE - 1u);
-    float y = sqrt(HAS_ANISOTROPY ? ggx_equal_alpha(wo, alpha) : alpha.x) * float(GGX_ALBEDO_SIZE - 1u);
-    uvec2 cell = min(uvec2(x, y), uvec2(GGX_ALBEDO_SIZE - 2u));
-    vec2 f = vec2(x, y) - vec2(cell);
+    vec2 at = ggx_albedo_coordinates(wo, alpha) * float(GGX_ALBEDO_SIZE - 1u);
+    uvec2 cell = min(uvec2(at), uvec2(GGX_ALBEDO_SIZE - 2u));
+    vec2 f = at - vec2(cell);
     uint first = table + cell.y * GGX_ALBEDO_SIZE + cell.x;
     vec4 low = uintBitsToFloat(LOAD4(TABLES, first));
     vec4 high = uintBitsToFloat(LOAD4(TABLES, first + GGX_ALBEDO_SIZE));

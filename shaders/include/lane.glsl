@@ -1,6 +1,7 @@
 // The state of a lane: its path, and the sums of its block. It survives a dispatch.
 #ifndef LANE_GLSL
 #define LANE_GLSL
+#include "media.glsl"
 
 // How emission found by the path's ray counts.
 const uint WEIGHT_FULL = 0u;    // all of it: seen by the camera, after a delta lobe, or light sampling is off
@@ -30,6 +31,7 @@ struct LaneState {
     float luminance_squared;
     vec3 compensation;
     uint samples;
+    Media media;           // that the path's ray, or after the shadow ray the scattered one, is in
 };
 
 // Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
@@ -70,6 +72,7 @@ LaneState new_lane(RenderConstants constants, SliceConstants slice, uint index) 
     lane.luminance_squared = 0.0;
     lane.compensation = vec3(0.0);
     lane.samples = 0u;
+    lane.media = OUTSIDE;
     return lane;
 }
 

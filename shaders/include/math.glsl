@@ -10,6 +10,8 @@ const float INV_PI = 0.318309886183791;
 // Half a unit in the last place of 1: the bound on the relative error of one rounded operation.
 const float UNIT_ROUNDOFF = 5.9604644775390625e-8;
 
+const float LARGEST_BELOW_1 = 0.999999940395355;
+
 // γ(n) = n·u / (1 − n·u) bounds the relative error of n rounded operations (Higham 2002, §3.1).
 #define GAMMA(n) (float(n) * UNIT_ROUNDOFF / (1.0 - float(n) * UNIT_ROUNDOFF))
 
@@ -39,6 +41,16 @@ vec2 cos_sin_turns(float u) {
     float sine = swap ? c : s;
     float cosine = swap ? s : c;
     return vec2(((k + 1) & 2) != 0 ? -cosine : cosine, (k & 2) != 0 ? -sine : sine);
+}
+
+// e^−x for x ≥ 0 to 2 ulp, infinity too (Cephes expf.c); 0 where it is below the normal numbers.
+float exp_minus(float x) {
+    if (x > 87.0) return 0.0;
+    float n = floor(x * 1.44269504088896341 + 0.5);
+    float r = (n * 0.693359375 - x) + n * -2.12194440e-4;
+    float p = ((((1.9875691500e-4 * r + 1.3981999507e-3) * r + 8.3334519073e-3) * r + 4.1665795894e-2) * r +
+               1.6666665459e-1) * r + 5.0000001201e-1;
+    return (p * r * r + r + 1.0) * uintBitsToFloat((127u - uint(n)) << 23u);
 }
 
 // atan(x) for x in [0, 1] (Cephes atanf.c): above tan(π/8) the argument (x − 1)/(x + 1) is used.

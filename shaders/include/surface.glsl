@@ -4,6 +4,7 @@
 #include "bsdf.glsl"
 #include "frame.glsl"
 #include "light.glsl"
+#include "media.glsl"
 #include "shading_normal.glsl"
 
 struct Surface {
@@ -15,6 +16,8 @@ struct Surface {
     BsdfParameters bsdf;
     vec3 emission;      // towards wo
     uint light;         // its light, NONE if light sampling cannot reach it
+    Media near;         // on the side of wo
+    Media far;          // on the other side
     bool black;         // scatters nothing
 };
 
@@ -35,6 +38,7 @@ BsdfParameters bsdf_parameters(RenderConstants constants, Material material, Ver
     p.ior = material.ior;
     // A thin wall has the same medium on both sides.
     p.eta = p.kind == BSDF_METALLIC_ROUGHNESS ? 1.0 : (front ? material.ior : 1.0 / material.ior);
+    p.solid = false;
     p.transmission = material.transmission;
     p.specular = material.specular;
     p.specular_color = material.specular_color;
@@ -48,7 +52,21 @@ BsdfParameters bsdf_parameters(RenderConstants constants, Material material, Ver
     return p;
 }
 
-Surface surface_at(RenderConstants constants, Hit hit, vec3 wo) {
+// A surface that encloses a volume: which media are on its sides, and their indices of refraction. One that is met from
+// behind, though the path did not enter it, was entered before the path began, by the camera.
+void set_media(RenderConstants constants, inout Surface s, uint material, bool front, Media media) {
+    if (!front && !is_inside(media, material)) media = entered(media, material);
+    s.near = media;
+    s.far = front ? entered(media, material) : left(media, material);
+    s.bsdf.solid = true;
+    // Of two volumes that overlap, the one entered last goes on where the other ends: there is no boundary.
+    bool same = s.near.stack.x == s.far.stack.x;
+    s.bsdf.eta = same ? 1.0 : medium_ior(constants, s.far) / medium_ior(constants, s.near);
+    if (s.bsdf.kind == BSDF_METALLIC_ROUGHNESS) s.bsdf.ior = s.bsdf.eta;
+}
+
+// `media` are those that the ray to the hit began in.
+Surface surface_at(RenderConstants constants, Hit hit, vec3 wo, Media media) {
     Surface s;
     TriangleVertices vertices = load_triangle(hit.triangle.slot);
     s.point = surface_point(constants, vertices, hit.triangle.instance, hit.barycentric);
@@ -57,6 +75,10 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo) {
     Vertices attributes = interpolate_vertices(constants, vertices.triangle, hit.triangle.instance, hit.barycentric);
     Material material = load_material(constants, vertices.material);
     s.bsdf = bsdf_parameters(constants, material, attributes, front);
+    s.near = media;
+    s.far = media;
+    if (HAS_VOLUME && (material.kind_flags & MATERIAL_VOLUME) != 0u)
+        set_media(constants, s, vertices.material, front, media);
     Shading shading = shading_at(constants, material, vertices, attributes, s.point, hit, s.side_normal, wo);
     s.frame = shading.frame;
     s.horizon = shading.horizon;

@@ -20,6 +20,7 @@ BsdfParameters load(uint configuration, out vec3 wo) {
     BsdfParameters p;
     p.color = uintBitsToFloat(inputs[base].xyz);
     p.kind = inputs[base].w & MATERIAL_KIND_MASK;
+    p.solid = (inputs[base].w & MATERIAL_VOLUME) != 0u;
     p.schlick = (inputs[base].w & MATERIAL_SCHLICK) != 0u;
     p.metallic = b.x;
     p.alpha = vec2(b.y, c.y);

@@ -1,8 +1,9 @@
-//! The albedo table of GGX: how much light one scattering keeps, by direction and roughness.
+//! The albedo tables of GGX: how much light one scattering keeps, by direction and roughness.
 //!
-//! The nodes are made and checked by tests/host/ggx_albedo.rs; shaders/include/ggx.glsl says what its coordinates are.
+//! The nodes are made and checked by tests/host/ggx_albedo.rs and tests/host/dielectric_albedo.rs; their coordinates are
+//! those of shaders/include/ggx.glsl and shaders/include/bsdf_dielectric.glsl.
 
-use crate::layout::{GGX_ALBEDO_SIZE, Texel};
+use crate::layout::{DIELECTRIC_ALBEDO_SIZE, GGX_ALBEDO_SIZE, Texel};
 
 /// Node (x, y) is two little-endian f32 at (y · size + x): the albedo, and the offset of Schlick's mean cosine.
 const NODES: &[u8] = include_bytes!("ggx_albedo.bin");
@@ -20,4 +21,23 @@ pub(super) fn albedo_table() -> Vec<Texel> {
         [a, b, c, d]
     };
     (0..size * size).map(texel).collect()
+}
+
+/// Node (x, y, z) of the rough dielectric's table is two little-endian u16 at ((z · size y) + y) · size x + x: the albedo and
+/// that without reflection, in units of 1/65535. First for η > 1, then for η < 1.
+const DIELECTRIC_NODES: &[u8] = include_bytes!("dielectric_albedo.bin");
+
+/// The table as the shader reads it: a texel holds the nodes (x, y), (x + 1, y), (x, y + 1) and (x + 1, y + 1).
+pub(super) fn dielectric_albedo_table() -> Vec<Texel> {
+    let [nx, ny, nz] = DIELECTRIC_ALBEDO_SIZE.map(|size| size as usize);
+    let node = |x: usize, y: usize, z: usize| {
+        let at = 4 * ((z * ny + y.min(ny - 1)) * nx + x.min(nx - 1));
+        let bytes = DIELECTRIC_NODES[at..at + 4].try_into().expect("four bytes");
+        u32::from_le_bytes(bytes)
+    };
+    let texel = |i: usize| {
+        let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
+        [node(x, y, z), node(x + 1, y, z), node(x, y + 1, z), node(x + 1, y + 1, z)]
+    };
+    (0..2 * nx * ny * nz).map(texel).collect()
 }

@@ -7,10 +7,11 @@ use super::features::Features;
 use super::textures::{ColorSpace, TextureTable};
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_ALPHA_BLEND,
-    MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK, Material,
+    MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK, MATERIAL_VOLUME,
+    Material,
     NONE, SLOT_MATERIAL_MASK, TEXTURE_SET_1,
 };
-use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding};
+use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding, Volume};
 
 /// The material table, with what later stages ask of a material.
 #[derive(Debug, Default)]
@@ -92,6 +93,14 @@ impl MaterialTable {
         self.records.iter().any(|record| record.kind_flags & MATERIAL_KIND_MASK == BSDF_METALLIC_ROUGHNESS)
     }
 
+    /// Whether any surface is the boundary of a volume by GGX.
+    pub(super) fn need_dielectrics(&self) -> bool {
+        self.records.iter().any(|record| {
+            record.kind_flags & MATERIAL_KIND_MASK == BSDF_METALLIC_ROUGHNESS
+                && record.kind_flags & MATERIAL_VOLUME != 0
+        })
+    }
+
     /// A bound on the share of a surface that is there, > 0, whatever its texture says. It weighs lights against each other.
     pub(super) fn largest_opacity(&self, record: u32) -> f64 {
         let record = &self.records[record as usize];
@@ -106,7 +115,9 @@ impl MaterialTable {
             features.emission_textures |= record.emission_texture != NONE;
             features.emission |= record.emission != [0.0; 3];
             features.normal_maps |= record.normal_texture != NONE;
-            features.transmission |= record.transmission > 0.0;
+            let solid = record.kind_flags & MATERIAL_VOLUME != 0;
+            features.volume |= solid;
+            features.transmission |= record.transmission > 0.0 && !solid;
             features.specular |= has_specular(record);
             features.alpha |= record.kind_flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0;
             features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
@@ -158,7 +169,7 @@ impl MaterialTable {
             normal_texture: bind(material.normal_texture, shaded && material.normal_scale != 0.0, ColorSpace::Linear)?,
             specular_color: material.specular_color,
             specular: material.specular,
-            absorption: [0.0; 3],
+            absorption: material.volume.map_or([0.0; 3], absorption),
             alpha_cutoff: if let Presence::Mask { cutoff } = presence { cutoff } else { 0.0 },
             anisotropy: material.anisotropy,
             anisotropy_turns: material.anisotropy_rotation_radians / std::f32::consts::TAU,
@@ -183,6 +194,13 @@ impl MaterialTable {
         self.emission_maps.push(map.filter(|_| emissive));
         Ok(MaterialUse { record: record_index, absent: false, alpha, texcoord_sets, tangents, shaded, emissive })
     }
+}
+
+/// Absorption coefficient in 1/m (KHR_materials_volume): −ln(color)/distance. A channel of 0 lets nothing pass: the largest
+/// number does so too, over every distance above 10⁻³⁶ m.
+fn absorption(volume: Volume) -> [f32; 3] {
+    let distance = f64::from(volume.attenuation_distance);
+    volume.attenuation_color.map(|c| (-f64::from(c).ln() / distance).min(f64::from(f32::MAX)) as f32)
 }
 
 /// Whether the reflection of a dielectric is not the plain one of its index of refraction.
@@ -224,6 +242,9 @@ fn kind_flags(material: &scene::Material, presence: Presence) -> u32 {
     }
     if material.bsdf == Bsdf::Glass && material.fresnel == Fresnel::Schlick {
         bits |= MATERIAL_SCHLICK;
+    }
+    if material.volume.is_some() {
+        bits |= MATERIAL_VOLUME;
     }
     match presence {
         Presence::Mask { .. } => bits | MATERIAL_ALPHA_MASK,

@@ -66,7 +66,7 @@ pub(super) fn pack_arrays(
         environment_height: environment.height,
         environment_marginal_word: environment.marginal_word,
         environment_conditional_word: environment.conditional_word,
-        ggx_albedo: if materials.need_ggx() { append(&mut tables, &super::ggx::albedo_table()) } else { 0 },
+        ggx_albedo: append_albedos(&mut tables, materials),
         environment_radiance: environment.radiance,
         environment_cos: cos as f32,
         environment_sin: sin as f32,
@@ -80,6 +80,18 @@ pub(super) fn pack_arrays(
         array.push(Texel::default());
     }
     (arrays, constants)
+}
+
+/// Appends the albedo tables that the materials need, that of rough dielectrics right behind that of GGX.
+fn append_albedos(tables: &mut Vec<Texel>, materials: &MaterialTable) -> u32 {
+    if !materials.need_ggx() {
+        return 0;
+    }
+    let first = append(tables, &super::ggx::albedo_table());
+    if materials.need_dielectrics() {
+        append(tables, &super::ggx::dielectric_albedo_table());
+    }
+    first
 }
 
 /// What the scene needs of the kernel.

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use glam::DVec3;
-use sunfleck::layout::{BSDF_METALLIC_ROUGHNESS, MATERIAL_SCHLICK};
+use sunfleck::layout::{BSDF_METALLIC_ROUGHNESS, MATERIAL_SCHLICK, MATERIAL_VOLUME};
 
 use super::ggx_albedo::{self, Albedo};
 use super::kernel::{TestKernel, floats, texel, vector, vector_texel};
@@ -29,6 +29,8 @@ pub struct Configuration {
     pub transmission: f32,
     pub specular: f32,
     pub specular_color: f32,
+    /// The boundary of a volume.
+    pub solid: bool,
     pub wo: DVec3,
 }
 
@@ -46,6 +48,7 @@ impl Configuration {
             transmission: 0.0,
             specular: 1.0,
             specular_color: 1.0,
+            solid: false,
             wo,
         }
     }
@@ -64,8 +67,10 @@ impl Configuration {
     fn texels(&self) -> [[u32; 4]; 4] {
         let [r, g, b] = self.color.map(f32::to_bits);
         let [alpha_x, alpha_z] = self.alphas();
+        let schlick = if self.schlick { MATERIAL_SCHLICK } else { 0 };
+        let solid = if self.solid { MATERIAL_VOLUME } else { 0 };
         [
-            [r, g, b, self.kind | if self.schlick { MATERIAL_SCHLICK } else { 0 }],
+            [r, g, b, self.kind | schlick | solid],
             texel(self.metallic, alpha_x, self.ior, self.eta),
             texel(self.transmission, alpha_z, self.specular, self.specular_color),
             vector_texel(self.wo, 0),
@@ -151,6 +156,11 @@ pub fn luminance(c: DVec3) -> f64 {
 /// shaders/test/bsdf.comp with a scene that has the albedo table.
 pub fn bsdf_kernel() -> TestKernel {
     TestKernel::with_scene("bsdf.comp", &scene("metallic_roughness"))
+}
+
+/// The same with a scene that has the albedo table of rough dielectrics too.
+pub fn dielectric_kernel() -> TestKernel {
+    TestKernel::with_scene("bsdf.comp", &scene("volumes"))
 }
 
 /// The metallic-roughness model of shaders/include/bsdf_metallic_roughness.glsl in f64, with the albedo of its table.

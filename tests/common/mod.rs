@@ -5,6 +5,7 @@ pub mod assets;
 pub mod brute_force;
 pub mod bsdf;
 pub mod builder;
+pub mod dielectric_albedo;
 pub mod ggx_albedo;
 pub mod gpu;
 pub mod irradiance;

@@ -8,6 +8,7 @@ mod bench_rows;
 mod film_images;
 mod film_metrics;
 mod film_sums;
+mod dielectric_albedo;
 mod ggx_albedo;
 mod prepare_alpha;
 mod prepare_bvh;

@@ -6,7 +6,7 @@
 
 use super::Loader;
 use super::json::Json;
-use crate::scene::{AlphaMode, Bsdf, Fresnel, Material, SceneResult, TextureBinding, TextureTransform};
+use crate::scene::{AlphaMode, Bsdf, Fresnel, Material, SceneResult, TextureBinding, TextureTransform, Volume};
 
 impl Loader<'_> {
     /// The index in `Scene::materials` of a glTF material, or of the default one. Where a primitive lacks a set of
@@ -54,6 +54,7 @@ impl Loader<'_> {
             self.read_specular(place, &mut material, has_texcoords)?;
             self.read_transmission(place, &mut material, has_texcoords)?;
         }
+        material.volume = read_volume(place, &material)?;
         self.warn_of_material(place)?;
         Ok(material)
     }
@@ -170,7 +171,7 @@ impl Loader<'_> {
         Ok(())
     }
 
-    /// KHR_materials_transmission is thin-walled; only a volume would make it solid.
+    /// KHR_materials_transmission: thin-walled, or into a volume.
     fn read_transmission(
         &mut self,
         place: &Json<'_>,
@@ -182,21 +183,14 @@ impl Loader<'_> {
         if material.transmission > 0.0 {
             material.transmission_texture = self.texture(extension.get("transmissionTexture")?, has_texcoords)?;
         }
-        if material.transmission > 0.0 && place.extension("KHR_materials_volume")?.is_some() {
-            let subject =
-                "KHR_materials_volume is not supported yet: transmission stays thin-walled, without refraction";
-            self.warnings.add(subject, &place.pointer);
-        }
         Ok(())
     }
 
     /// Names the features of a material that are not covered. Occlusion textures are no part of a path tracer.
     fn warn_of_material(&mut self, place: &Json<'_>) -> SceneResult<()> {
-        let volume_was_named = self.warnings.has("KHR_materials_volume ");
         for name in place.extension_names()? {
             let known = super::SUPPORTED.contains(&name.as_str()) || super::INVISIBLE.contains(&name.as_str());
-            let said = volume_was_named && name == "KHR_materials_volume";
-            if !known && !said {
+            if !known {
                 let subject = format!("{name} is not supported yet: what it describes is ignored");
                 self.warnings.add(subject, &place.pointer);
             }
@@ -229,6 +223,24 @@ impl Loader<'_> {
         let texture = self.load_texture(index, &place)?;
         Ok(Some(TextureBinding { texture, set, transform }))
     }
+}
+
+/// KHR_materials_volume: what a surface that transmits encloses, unless its thickness of 0 says that it is a thin wall.
+/// How thick it is, geometry says.
+fn read_volume(place: &Json<'_>, material: &Material) -> SceneResult<Option<Volume>> {
+    let Some(extension) = place.extension("KHR_materials_volume")? else { return Ok(None) };
+    let thickness = extension.number_in("thicknessFactor", 0.0, 0.0, f64::MAX)?;
+    let attenuation_color = extension.color("attenuationColor", [1.0; 3], 1.0)?.map(|c| c as f32);
+    let distance = match extension.get("attenuationDistance")? {
+        Some(place) => place.number_within(f64::from(f32::MIN_POSITIVE), f64::MAX)?,
+        None => f64::INFINITY,
+    };
+    let transmits = match material.bsdf {
+        Bsdf::MetallicRoughness => material.transmission > 0.0,
+        Bsdf::Refract | Bsdf::Glass => true,
+        Bsdf::Lambertian | Bsdf::Mirror | Bsdf::Unlit => false,
+    };
+    Ok((transmits && thickness > 0.0).then_some(Volume { attenuation_color, attenuation_distance: distance as f32 }))
 }
 
 /// KHR_texture_transform.
