@@ -227,7 +227,7 @@ pub struct Material {
 /// Nodes of the albedo table of GGX along each of its coordinates. A texel holds a node and the one after it.
 pub const GGX_ALBEDO_SIZE: u32 = 48;
 
-/// Nodes of the albedo table of rough dielectrics along its coordinates, for each side. It follows that of GGX. A texel
+/// Nodes of the albedo table of rough dielectrics along its coordinates, for each side. It stands before that of GGX. A texel
 /// holds a node and the three next to it along the first two coordinates, 16 bits a number.
 pub const DIELECTRIC_ALBEDO_SIZE: [u32; 3] = [40, 20, 40];
 

@@ -43,8 +43,7 @@ bool metallic_roughness_has_continuous_lobe(BsdfParameters p) {
 void metallic_roughness_prepare(RenderConstants constants, inout BsdfParameters p, vec3 wo) {
     p.albedo = ggx_is_delta(p) ? GgxAlbedo(1.0, pow5(1.0 - wo.y)) : ggx_albedo(constants.ggx_albedo, wo, p.alpha);
     if (dielectric_share(p) > 0.0 && !dielectric_is_delta(p)) {
-        uint table = constants.ggx_albedo + GGX_ALBEDO_SIZE * GGX_ALBEDO_SIZE;
-        p.dielectric_albedo = dielectric_albedo(table, wo, p.alpha, p.eta, p.specular);
+        p.dielectric_albedo = dielectric_albedo(constants, wo, p);
     }
 }
 

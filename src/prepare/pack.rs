@@ -82,16 +82,16 @@ pub(super) fn pack_arrays(
     (arrays, constants)
 }
 
-/// Appends the albedo tables that the materials need, that of rough dielectrics right behind that of GGX.
+/// Appends the albedo tables that the materials need and says where that of GGX begins; that of rough dielectrics stands
+/// before it.
 fn append_albedos(tables: &mut Vec<Texel>, materials: &MaterialTable) -> u32 {
     if !materials.need_ggx() {
         return 0;
     }
-    let first = append(tables, &super::ggx::albedo_table());
     if materials.need_dielectrics() {
         append(tables, &super::ggx::dielectric_albedo_table());
     }
-    first
+    append(tables, &super::ggx::albedo_table())
 }
 
 /// What the scene needs of the kernel.
