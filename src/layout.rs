@@ -227,6 +227,10 @@ pub struct Material {
 /// Nodes of the albedo table of GGX along each of its coordinates. A texel holds a node and the one after it.
 pub const GGX_ALBEDO_SIZE: u32 = 48;
 
+/// Nodes of the table of anisotropic albedos along each of its coordinates: direction (polar angle), azimuth, ratio of the
+/// two roughnesses, larger roughness.
+pub const GGX_ANISOTROPIC_SIZES: [u32; 4] = [24, 8, 12, 20];
+
 /// Texels a material takes.
 pub const MATERIAL_TEXELS: u32 = 8;
 

@@ -108,6 +108,7 @@ impl MaterialTable {
             features.normal_maps |= record.normal_texture != NONE;
             features.transmission |= record.transmission > 0.0;
             features.specular |= has_specular(record);
+            features.anisotropy |= record.anisotropy > 0.0;
             features.alpha |= record.kind_flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0;
             features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
             features.schlick |= record.kind_flags & MATERIAL_SCHLICK != 0;
@@ -138,6 +139,7 @@ impl MaterialTable {
             _ => None,
         };
         let emissive = may_emit && !map.as_ref().is_some_and(EmissionMap::is_black);
+        let anisotropy = if rough { material.anisotropy } else { 0.0 };
         let transmission = if rough { material.transmission } else { 0.0 };
         let record = Material {
             base_color: material.base_color,
@@ -160,25 +162,21 @@ impl MaterialTable {
             specular: material.specular,
             absorption: [0.0; 3],
             alpha_cutoff: if let Presence::Mask { cutoff } = presence { cutoff } else { 0.0 },
-            anisotropy: material.anisotropy,
+            anisotropy,
             anisotropy_turns: material.anisotropy_rotation_radians / std::f32::consts::TAU,
             normal_scale: material.normal_scale,
             unused: 0,
             transmission_texture: bind(material.transmission_texture, transmission > 0.0, ColorSpace::Linear)?,
             specular_texture: bind(material.specular_texture, rough && material.specular > 0.0, ColorSpace::Linear)?,
             specular_color_texture: bind(material.specular_color_texture, rough, ColorSpace::Srgb)?,
-            anisotropy_texture: bind(
-                material.anisotropy_texture,
-                rough && material.anisotropy > 0.0,
-                ColorSpace::Linear,
-            )?,
+            anisotropy_texture: bind(material.anisotropy_texture, anisotropy > 0.0, ColorSpace::Linear)?,
         };
         let mut texcoord_sets = [false; 2];
         for texture in textures_of(&record).into_iter().filter(|&texture| texture != NONE) {
             let second = textures.headers[texture as usize].sampling & TEXTURE_SET_1 != 0;
             texcoord_sets[usize::from(second)] = true;
         }
-        let tangents = record.normal_texture != NONE || rough && material.anisotropy > 0.0;
+        let tangents = record.normal_texture != NONE || anisotropy > 0.0;
         self.records.push(record);
         self.emission_maps.push(map.filter(|_| emissive));
         Ok(MaterialUse { record: record_index, absent: false, alpha, texcoord_sets, tangents, shaded, emissive })

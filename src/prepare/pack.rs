@@ -10,7 +10,7 @@ use super::lights::LightTable;
 use super::materials::MaterialTable;
 use super::textures::TextureTable;
 use super::{PreparedInstance, Statistics};
-use crate::layout::{RenderConstants, SCENE_ARRAYS, TRIANGLE_COLORS, TRIANGLE_NORMALS, Texel};
+use crate::layout::{RenderConstants, SCENE_ARRAYS, TRIANGLE_COLORS, TRIANGLE_NORMALS, TRIANGLE_TANGENTS, Texel};
 
 /// Words in texels of four, the last padded with zeros.
 pub(super) fn pack_words(words: &[u32]) -> Vec<Texel> {
@@ -44,6 +44,7 @@ pub(super) fn pack_arrays(
     textures: TextureTable,
     environment: PreparedEnvironment,
     lights: &LightTable,
+    features: &Features,
 ) -> ([Vec<Texel>; SCENE_ARRAYS], RenderConstants) {
     let bounds = acceleration.bounds.to_f64();
     let mut attributes = Vec::new();
@@ -66,7 +67,7 @@ pub(super) fn pack_arrays(
         environment_height: environment.height,
         environment_marginal_word: environment.marginal_word,
         environment_conditional_word: environment.conditional_word,
-        ggx_albedo: if materials.need_ggx() { append(&mut tables, &super::ggx::albedo_table()) } else { 0 },
+        ggx_albedo: if materials.need_ggx() { append_ggx_albedo(&mut tables, features) } else { 0 },
         environment_radiance: environment.radiance,
         environment_cos: cos as f32,
         environment_sin: sin as f32,
@@ -80,6 +81,15 @@ pub(super) fn pack_arrays(
         array.push(Texel::default());
     }
     (arrays, constants)
+}
+
+/// The albedo tables: the second one follows on the first, where the shader looks for it.
+fn append_ggx_albedo(tables: &mut Vec<Texel>, features: &Features) -> u32 {
+    let first = append(tables, &super::ggx::albedo_table());
+    if features.anisotropy {
+        append(tables, &super::ggx::anisotropic_albedo_table());
+    }
+    first
 }
 
 /// What the scene needs of the kernel.
@@ -101,6 +111,8 @@ pub(super) fn features(
         ..Features::default()
     };
     materials.add_features(&mut features);
+    // Without tangents it has no direction.
+    features.anisotropy &= any(TRIANGLE_TANGENTS);
     features
 }
 
