@@ -54,8 +54,10 @@ class Scene:
         return len(self.doc["accessors"]) - 1
 
     def material(self, name, color=(1, 1, 1), extras=None, emission=None, metallic=None, roughness=None, ior=None,
-                 double_sided=False, texture=None, alpha=None, cutoff=None, transmission=None, attenuation=None):
-        """`alpha` makes it BLEND, `cutoff` MASK; `attenuation` makes it a volume: a colour and the distance for it."""
+                 double_sided=False, texture=None, alpha=None, cutoff=None, transmission=None, attenuation=None,
+                 anisotropy=None):
+        """`alpha` makes it BLEND, `cutoff` MASK; `attenuation`, a colour and the distance for it, makes it a volume;
+        `anisotropy` is (strength, rotation) or (strength, rotation, texture)."""
         factor = [*color, 1 if alpha is None else alpha]
         material = {"name": name, "pbrMetallicRoughness": {"baseColorFactor": factor}}
         if alpha is not None:
@@ -85,6 +87,12 @@ class Scene:
             if distance is not None:
                 volume.update(attenuationColor=list(color), attenuationDistance=distance)
             extensions["KHR_materials_volume"] = volume
+        if anisotropy is not None:
+            strength, rotation, *texture = anisotropy
+            extension = {"anisotropyStrength": strength, "anisotropyRotation": rotation}
+            if texture:
+                extension["anisotropyTexture"] = {"index": texture[0]}
+            extensions["KHR_materials_anisotropy"] = extension
         if extensions:
             material["extensions"] = extensions
             self.use(*extensions)
@@ -112,7 +120,7 @@ class Scene:
         return len(textures) - 1
 
     def mesh(self, name, *parts):
-        """Each part is (shape, material); a shape has positions, triangles and maybe normals and texcoords."""
+        """Each part is (shape, material); a shape has positions, triangles and maybe normals, tangents and texcoords."""
         primitives = [{**self.geometry(shape), "material": material} for shape, material in parts]
         self.doc["meshes"].append({"name": name, "primitives": primitives})
         return len(self.doc["meshes"]) - 1
@@ -123,6 +131,8 @@ class Scene:
             attributes = {"POSITION": self.accessor("VEC3", 5126, shape["positions"], True)}
             if "normals" in shape:
                 attributes["NORMAL"] = self.accessor("VEC3", 5126, shape["normals"])
+            if "tangents" in shape:
+                attributes["TANGENT"] = self.accessor("VEC4", 5126, shape["tangents"])
             if "texcoords" in shape:
                 attributes["TEXCOORD_0"] = self.accessor("VEC2", 5126, shape["texcoords"])
             component = 5123 if len(shape["positions"]) < 65535 else 5125
@@ -471,6 +481,62 @@ def volumes():
     scene.write("volumes")
 
 
+def polar_sphere(rings, sectors, radius):
+    """A smooth sphere with tangents along its circles of latitude, counter-clockwise from above."""
+    positions, normals, tangents, triangles = [], [], [], []
+    for ring in range(rings + 1):
+        polar = math.pi * ring / rings
+        for sector in range(sectors + 1):
+            s, c = math.sin(math.tau * sector / sectors), math.cos(math.tau * sector / sectors)
+            normal = (math.sin(polar) * s, math.cos(polar), math.sin(polar) * c)
+            normals.append(normal)
+            positions.append([radius * x for x in normal])
+            tangents.append((c, 0, -s, 1))
+    for ring in range(rings):
+        for sector in range(sectors):
+            a = ring * (sectors + 1) + sector
+            b = a + sectors + 1
+            if ring > 0:
+                triangles.append((a, b, a + 1))
+            if ring < rings - 1:
+                triangles.append((a + 1, b, b + 1))
+    return {"positions": positions, "normals": normals, "tangents": tangents, "triangles": triangles}
+
+
+def circular_grooves(size):
+    """An anisotropy texture: rough away from the centre, across grooves that run around it."""
+
+    def texel(x, y):
+        right, up = 2 * x + 1 - size, size - 1 - 2 * y
+        length = math.hypot(right, up)
+        return (round(127.5 + 127.5 * right / length), round(127.5 + 127.5 * up / length), 255)
+
+    return png(size, texel)
+
+
+def anisotropy():
+    scene = Scene()
+    scene.environment((0.25, 0.28, 0.32))
+    lamp(scene, 0.6, 4.0, (40, 38, 35))
+    scene.place("floor", floor(6, -2.0), scene.diffuse("floor", (0.4, 0.4, 0.4)))
+    ball = polar_sphere(24, 48, 0.45)
+    for row in range(3):
+        for column in range(5):
+            strength, rotation = column / 4, row * math.pi / 4
+            name = f"strength {strength} rotation {45 * row}"
+            material = scene.material(name, (0.9, 0.75, 0.55), metallic=1, roughness=0.25,
+                                      anisotropy=(strength, rotation))
+            scene.place(name, ball, material, translation=[1.05 * (column - 2), 1.05 * (row - 0.6), 0])
+    grooves = scene.texture(circular_grooves(32), name="circular grooves")
+    brushed = scene.material("brushed plate", (0.8, 0.8, 0.85), metallic=1, roughness=0.2, anisotropy=(1, 0, grooves))
+    plate = quad((-1.4, -1.9, 2.4), (1.4, -1.9, 2.4), (1.4, -1.3, 0.6), (-1.4, -1.3, 0.6))
+    plate["normals"] = [normalize((0, 1.8, 0.6))] * 4
+    plate["tangents"] = [(1, 0, 0, 1)] * 4
+    scene.place("plate", plate, brushed)
+    scene.camera((0, 0.3, 9), (0, -0.1, 0), 34)
+    scene.write("anisotropy")
+
+
 def many_lights():
     scene = Scene()
     scene.place("floor", floor(4), scene.diffuse("floor", (0.7, 0.7, 0.7)))
@@ -511,5 +577,6 @@ if __name__ == "__main__":
     alpha()
     metallic_roughness()
     volumes()
+    anisotropy()
     many_lights()
     caustic()

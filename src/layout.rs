@@ -231,6 +231,10 @@ pub const GGX_ALBEDO_SIZE: u32 = 48;
 /// holds a node and the three next to it along the first two coordinates, 16 bits a number.
 pub const DIELECTRIC_ALBEDO_SIZE: [u32; 3] = [40, 20, 40];
 
+/// Nodes of the table of anisotropic albedos along each of its coordinates: direction (polar angle), azimuth, ratio of the
+/// two roughnesses, larger roughness.
+pub const GGX_ANISOTROPIC_SIZES: [u32; 4] = [24, 8, 12, 20];
+
 /// Texels a material takes.
 pub const MATERIAL_TEXELS: u32 = 8;
 

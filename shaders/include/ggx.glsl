@@ -11,6 +11,12 @@
 // D(h) relatively by some 4·2^-24/α; at α = 2^-12 that is 2^-10, and the lobe's width is 2.4e-4 radians.
 const float SMALLEST_ALPHA = 2.44140625e-4;
 
+// The roughness that floats can resolve: a delta where neither direction is wider than that limit; where one is, the other
+// is as narrow as the limit, since a lobe that is a delta in one direction alone has no density over the sphere.
+vec2 resolvable_alpha(vec2 alpha) {
+    return max(alpha.x, alpha.y) < SMALLEST_ALPHA ? vec2(0.0) : max(alpha, vec2(SMALLEST_ALPHA));
+}
+
 float ggx_distribution(vec3 h, vec2 alpha) {
     // αx·αz·(h.x²/αx² + h.y² + h.z²/αz²): for equal roughness sin²θ/1 + α²cos²θ over α², without cancellation.
     float a2 = alpha.x * alpha.y;
@@ -58,25 +64,56 @@ struct GgxAlbedo {
     float schlick;
 };
 
-// The equal roughness that loses about as much as an anisotropic one: with it the albedo is off by −2 % to +3 % where one
-// roughness is up to four times the other. The margin, added to the albedo in proportion to their difference over their
-// sum, makes an error a loss: what is given back is never too much (tests/gpu/bsdf_chi_square.rs).
-float ggx_equal_alpha(vec3 wo, vec2 alpha) {
-    vec2 squared = alpha * alpha;
-    return sqrt(0.5 * (squared.x + squared.y) + 0.125 * (squared.y - squared.x) * (sqr(wo.x) - sqr(wo.z)));
+// From what the tables hold: the albedo, and where the cosine whose weight is the mean of Schlick's lies, from cos θo on in
+// units of |stretched wo|.
+GgxAlbedo ggx_albedo_of(vec2 entry, float cos_o, float stretched) {
+    float remaining = 1.0 - (cos_o + stretched * entry.y);
+    float squared = remaining * remaining;
+    return GgxAlbedo(entry.x, entry.x * squared * squared * remaining);
 }
-const float ANISOTROPIC_MARGIN = 0.065;
 
-// Coordinates of albedo tables, in [0, 1]: the polar angle φ of the direction stretched by the roughness, as
+// What the second number of the table below is stored in units of.
+const float GGX_OFFSET_UNIT = 8.0;
+
+// Where the two roughnesses differ, the azimuth of the stretched direction and √(smaller/larger) are coordinates too, and
+// √larger takes the place of √α. The direction that is stretched by both resolves what happens when one sees along the
+// grooves, however deep they are: the table is good to half a percent at every ratio. Texels hold the four nodes of a cell
+// of polar angle and azimuth.
+vec2 ggx_anisotropic_cell(uint cell, vec2 f) {
+    uvec4 nodes = LOAD4(TABLES, cell);
+    return mix(mix(unpackSnorm2x16(nodes.x), unpackSnorm2x16(nodes.y), f.x),
+               mix(unpackSnorm2x16(nodes.z), unpackSnorm2x16(nodes.w), f.x), f.y);
+}
+
+GgxAlbedo ggx_anisotropic_albedo(uint table, vec3 wo, vec2 alpha) {
+    vec2 horizontal = abs(alpha * wo.xz);
+    if (alpha.x < alpha.y) horizontal = horizontal.yx;
+    float larger = max(alpha.x, alpha.y);
+    float stretched = ggx_stretched_length(wo, alpha);
+    vec4 at = vec4(sqrt(wo.y / (stretched + length(horizontal))), 4.0 * turns(horizontal.y, horizontal.x),
+                   sqrt(min(alpha.x, alpha.y) / larger), sqrt(larger)) *
+              vec4(GGX_ANISOTROPIC_SIZES - 1u);
+    uvec4 node = min(uvec4(at), GGX_ANISOTROPIC_SIZES - 2u);
+    vec4 f = at - vec4(node);
+    uint row = GGX_ANISOTROPIC_SIZES.x * GGX_ANISOTROPIC_SIZES.y;
+    uint first = table + (node.w * GGX_ANISOTROPIC_SIZES.z + node.z) * row + node.y * GGX_ANISOTROPIC_SIZES.x + node.x;
+    uint next = first + GGX_ANISOTROPIC_SIZES.z * row;
+    vec2 low = mix(ggx_anisotropic_cell(first, f.xy), ggx_anisotropic_cell(first + row, f.xy), f.z);
+    vec2 high = mix(ggx_anisotropic_cell(next, f.xy), ggx_anisotropic_cell(next + row, f.xy), f.z);
+    return ggx_albedo_of(mix(low, high, f.w) * vec2(1.0, GGX_OFFSET_UNIT), wo.y, stretched);
+}
+
+// Coordinates of the albedo tables for equal roughness, in [0, 1]: the polar angle φ of the direction stretched by the roughness, as
 // √tan(π/4 − φ/2), and √α. Albedos are smooth in them down to grazing angles and to the delta.
 vec2 ggx_albedo_coordinates(vec3 wo, vec2 alpha) {
     float horizontal = sqrt(sqr(alpha.x * wo.x) + sqr(alpha.y * wo.z));
-    return sqrt(vec2(wo.y / (ggx_stretched_length(wo, alpha) + horizontal),
-                     HAS_ANISOTROPY ? ggx_equal_alpha(wo, alpha) : alpha.x));
+    return sqrt(vec2(wo.y / (ggx_stretched_length(wo, alpha) + horizontal), alpha.x));
 }
 
 // By a table made by quadrature (tests/common/ggx_albedo.rs).
 GgxAlbedo ggx_albedo(uint table, vec3 wo, vec2 alpha) {
+    if (HAS_ANISOTROPY && alpha.x != alpha.y)
+        return ggx_anisotropic_albedo(table + GGX_ALBEDO_SIZE * GGX_ALBEDO_SIZE, wo, alpha);
     float stretched = ggx_stretched_length(wo, alpha);
     vec2 at = ggx_albedo_coordinates(wo, alpha) * float(GGX_ALBEDO_SIZE - 1u);
     uvec2 cell = min(uvec2(at), uvec2(GGX_ALBEDO_SIZE - 2u));
@@ -85,11 +122,7 @@ GgxAlbedo ggx_albedo(uint table, vec3 wo, vec2 alpha) {
     vec4 low = uintBitsToFloat(LOAD4(TABLES, first));
     vec4 high = uintBitsToFloat(LOAD4(TABLES, first + GGX_ALBEDO_SIZE));
     vec4 mixed = mix(low, high, f.y);
-    vec2 entry = mix(mixed.xy, mixed.zw, f.x);
-    if (HAS_ANISOTROPY) entry.x = min(1.0, entry.x + ANISOTROPIC_MARGIN * abs(alpha.x - alpha.y) / (alpha.x + alpha.y));
-    float remaining = 1.0 - (wo.y + stretched * entry.y);
-    float squared = remaining * remaining;
-    return GgxAlbedo(entry.x, entry.x * squared * squared * remaining);
+    return ggx_albedo_of(mix(mixed.xy, mixed.zw, f.x), wo.y, stretched);
 }
 
 #endif

@@ -1,6 +1,7 @@
 // What shading needs at a hit: the point, the frame, the BSDF's parameters and the emission.
 #ifndef SURFACE_GLSL
 #define SURFACE_GLSL
+#include "anisotropy.glsl"
 #include "bsdf.glsl"
 #include "frame.glsl"
 #include "light.glsl"
@@ -33,8 +34,7 @@ BsdfParameters bsdf_parameters(RenderConstants constants, Material material, Ver
         roughness *= texel.g;
         p.metallic *= texel.b;
     }
-    float alpha = roughness * roughness;
-    p.alpha = vec2(alpha < SMALLEST_ALPHA ? 0.0 : alpha);
+    p.alpha = vec2(roughness * roughness);
     p.ior = material.ior;
     // A thin wall has the same medium on both sides.
     p.eta = p.kind == BSDF_METALLIC_ROUGHNESS ? 1.0 : (front ? material.ior : 1.0 / material.ior);
@@ -81,6 +81,9 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo, Media media) {
         set_media(constants, s, vertices.material, front, media);
     Shading shading = shading_at(constants, material, vertices, attributes, s.point, hit, s.side_normal, wo);
     s.frame = shading.frame;
+    if (HAS_ANISOTROPY && material.anisotropy > 0.0 && attributes.tangent.w != 0.0)
+        make_anisotropic(constants, material, attributes.texcoords, s.frame, s.bsdf.alpha);
+    s.bsdf.alpha = resolvable_alpha(s.bsdf.alpha);
     s.horizon = shading.horizon;
     s.lift = shading.lift;
     // Between the two horizons of a lifted point, light would come through and be reflected too.

@@ -7,9 +7,8 @@ use super::features::Features;
 use super::textures::{ColorSpace, TextureTable};
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_ALPHA_BLEND,
-    MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK, MATERIAL_VOLUME,
-    Material,
-    NONE, SLOT_MATERIAL_MASK, TEXTURE_SET_1,
+    MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK,
+    MATERIAL_VOLUME, Material, NONE, SLOT_MATERIAL_MASK, TEXTURE_SET_1,
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding, Volume};
 
@@ -119,6 +118,7 @@ impl MaterialTable {
             features.volume |= solid;
             features.transmission |= record.transmission > 0.0 && !solid;
             features.specular |= has_specular(record);
+            features.anisotropy |= record.anisotropy > 0.0;
             features.alpha |= record.kind_flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0;
             features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
             features.schlick |= record.kind_flags & MATERIAL_SCHLICK != 0;
@@ -149,6 +149,7 @@ impl MaterialTable {
             _ => None,
         };
         let emissive = may_emit && !map.as_ref().is_some_and(EmissionMap::is_black);
+        let anisotropy = if rough { material.anisotropy } else { 0.0 };
         let transmission = if rough { material.transmission } else { 0.0 };
         let record = Material {
             base_color: material.base_color,
@@ -171,25 +172,21 @@ impl MaterialTable {
             specular: material.specular,
             absorption: material.volume.map_or([0.0; 3], absorption),
             alpha_cutoff: if let Presence::Mask { cutoff } = presence { cutoff } else { 0.0 },
-            anisotropy: material.anisotropy,
+            anisotropy,
             anisotropy_turns: material.anisotropy_rotation_radians / std::f32::consts::TAU,
             normal_scale: material.normal_scale,
             unused: 0,
             transmission_texture: bind(material.transmission_texture, transmission > 0.0, ColorSpace::Linear)?,
             specular_texture: bind(material.specular_texture, rough && material.specular > 0.0, ColorSpace::Linear)?,
             specular_color_texture: bind(material.specular_color_texture, rough, ColorSpace::Srgb)?,
-            anisotropy_texture: bind(
-                material.anisotropy_texture,
-                rough && material.anisotropy > 0.0,
-                ColorSpace::Linear,
-            )?,
+            anisotropy_texture: bind(material.anisotropy_texture, anisotropy > 0.0, ColorSpace::Linear)?,
         };
         let mut texcoord_sets = [false; 2];
         for texture in textures_of(&record).into_iter().filter(|&texture| texture != NONE) {
             let second = textures.headers[texture as usize].sampling & TEXTURE_SET_1 != 0;
             texcoord_sets[usize::from(second)] = true;
         }
-        let tangents = record.normal_texture != NONE || rough && material.anisotropy > 0.0;
+        let tangents = record.normal_texture != NONE || anisotropy > 0.0;
         self.records.push(record);
         self.emission_maps.push(map.filter(|_| emissive));
         Ok(MaterialUse { record: record_index, absent: false, alpha, texcoord_sets, tangents, shaded, emissive })

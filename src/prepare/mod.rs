@@ -210,7 +210,8 @@ pub fn prepare(scene: &Scene, options: &PrepareOptions) -> Result<Prepared, Prep
     let instances = pack::prepared_instances(&acceleration);
     let meshes = std::mem::take(&mut acceleration.meshes);
     let origin = geometry.origin;
-    let (arrays, constants) = pack::pack_arrays(geometry, acceleration, &materials, textures, environment, &lights);
+    let (arrays, constants) =
+        pack::pack_arrays(geometry, acceleration, &materials, textures, environment, &lights, &features);
     statistics.array_bytes = [0, 1, 2, 3, 4].map(|i: usize| (arrays[i].len() * size_of::<Texel>()) as u64);
     statistics.bvh_seconds = bvh_seconds;
     statistics.seconds = start.elapsed().as_secs_f64();

@@ -10,7 +10,7 @@ use super::lights::LightTable;
 use super::materials::MaterialTable;
 use super::textures::TextureTable;
 use super::{PreparedInstance, Statistics};
-use crate::layout::{RenderConstants, SCENE_ARRAYS, TRIANGLE_COLORS, TRIANGLE_NORMALS, Texel};
+use crate::layout::{RenderConstants, SCENE_ARRAYS, TRIANGLE_COLORS, TRIANGLE_NORMALS, TRIANGLE_TANGENTS, Texel};
 
 /// Words in texels of four, the last padded with zeros.
 pub(super) fn pack_words(words: &[u32]) -> Vec<Texel> {
@@ -44,6 +44,7 @@ pub(super) fn pack_arrays(
     textures: TextureTable,
     environment: PreparedEnvironment,
     lights: &LightTable,
+    features: &Features,
 ) -> ([Vec<Texel>; SCENE_ARRAYS], RenderConstants) {
     let bounds = acceleration.bounds.to_f64();
     let mut attributes = Vec::new();
@@ -66,7 +67,7 @@ pub(super) fn pack_arrays(
         environment_height: environment.height,
         environment_marginal_word: environment.marginal_word,
         environment_conditional_word: environment.conditional_word,
-        ggx_albedo: append_albedos(&mut tables, materials),
+        ggx_albedo: append_albedos(&mut tables, materials, features),
         environment_radiance: environment.radiance,
         environment_cos: cos as f32,
         environment_sin: sin as f32,
@@ -82,16 +83,20 @@ pub(super) fn pack_arrays(
     (arrays, constants)
 }
 
-/// Appends the albedo tables that the materials need and says where that of GGX begins; that of rough dielectrics stands
-/// before it.
-fn append_albedos(tables: &mut Vec<Texel>, materials: &MaterialTable) -> u32 {
+/// Appends the albedo tables that the materials need and says where that of GGX begins: that of rough dielectrics stands
+/// before it, that of unequal roughness behind it.
+fn append_albedos(tables: &mut Vec<Texel>, materials: &MaterialTable, features: &Features) -> u32 {
     if !materials.need_ggx() {
         return 0;
     }
     if materials.need_dielectrics() {
         append(tables, &super::ggx::dielectric_albedo_table());
     }
-    append(tables, &super::ggx::albedo_table())
+    let first = append(tables, &super::ggx::albedo_table());
+    if features.anisotropy {
+        append(tables, &super::ggx::anisotropic_albedo_table());
+    }
+    first
 }
 
 /// What the scene needs of the kernel.
@@ -113,6 +118,8 @@ pub(super) fn features(
         ..Features::default()
     };
     materials.add_features(&mut features);
+    // Without tangents it has no direction.
+    features.anisotropy &= any(TRIANGLE_TANGENTS);
     features
 }
 

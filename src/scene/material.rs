@@ -90,9 +90,9 @@ pub struct Material {
     pub specular_color_texture: Option<TextureBinding>,
     /// Strength of the anisotropy, in [0, 1] (KHR_materials_anisotropy).
     pub anisotropy: f32,
-    /// Direction of the larger roughness' normal: counter-clockwise from the tangent, in radians.
+    /// Direction in which the surface is rougher: counter-clockwise from the tangent, on top of the texture's, in radians.
     pub anisotropy_rotation_radians: f32,
-    /// Direction in its R and G, strength in its B (linear image).
+    /// Direction in its R and G, as x and y of the tangent space in [-1, 1]; multiplies `anisotropy` by its B (linear image).
     pub anisotropy_texture: Option<TextureBinding>,
     /// Tangent-space normals (linear image, RGB).
     pub normal_texture: Option<TextureBinding>,

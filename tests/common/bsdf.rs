@@ -153,9 +153,9 @@ pub fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// shaders/test/bsdf.comp with a scene that has the albedo table.
+/// shaders/test/bsdf.comp with a scene that has the albedo tables.
 pub fn bsdf_kernel() -> TestKernel {
-    TestKernel::with_scene("bsdf.comp", &scene("metallic_roughness"))
+    TestKernel::with_scene("bsdf.comp", &scene("anisotropy"))
 }
 
 /// The same with a scene that has the albedo table of rough dielectrics too.
@@ -282,9 +282,12 @@ impl MetallicRoughness {
 }
 
 /// Bins of directions that resolve a lobe however narrow: rings of the half vector's polar angle around the normal, cut
-/// into sectors of its azimuth counted from wo's.
+/// into sectors of its azimuth counted from wo's. Where the roughness along x and z differs, the half vector is scaled
+/// first, so that its distribution is round.
 pub struct HalfVectorBins {
     wo: DVec3,
+    /// By what the slopes along x were multiplied, and those along z divided.
+    stretch: f64,
     azimuth: f64,
     /// Ascending polar angles, 0 to π/2.
     rings: Vec<f64>,
@@ -300,7 +303,7 @@ pub struct Node {
 const SECTORS: usize = 8;
 
 impl HalfVectorBins {
-    pub fn new(alpha: f64, wo: DVec3) -> Self {
+    pub fn new(alpha: f64, stretch: f64, wo: DVec3) -> Self {
         let tangents = (1..10).map(|i| f64::from(i) / 10.0).map(|t| alpha * (t / (1.0 - t)).sqrt());
         // Rings of equal probability for the GGX lobe, rings of equal width for what is broad.
         let mut rings: Vec<f64> = tangents.map(f64::atan).filter(|angle| *angle > 0.0).collect();
@@ -317,7 +320,7 @@ impl HalfVectorBins {
             }
         }
         rings.insert(0, 0.0);
-        Self { wo, azimuth: wo.z.atan2(wo.x), rings }
+        Self { wo, stretch, azimuth: (wo.z * stretch).atan2(wo.x / stretch), rings }
     }
 
     pub fn len(&self) -> usize {
@@ -326,6 +329,7 @@ impl HalfVectorBins {
 
     pub fn bin(&self, wi: DVec3) -> usize {
         let h = self.wo + wi;
+        let h = DVec3::new(h.x / self.stretch, h.y, h.z * self.stretch);
         let polar = h.x.hypot(h.z).atan2(h.y);
         let turns = ((h.z.atan2(h.x) - self.azimuth) / (2.0 * PI) + 0.5).rem_euclid(1.0);
         let ring = self.rings.partition_point(|ring| *ring <= polar).clamp(1, self.rings.len() - 1) - 1;
@@ -346,6 +350,10 @@ impl HalfVectorBins {
             for piece in pieces.windows(2) {
                 for (x, weight) in &polar_rule {
                     let polar = piece[0] + (piece[1] - piece[0]) * x;
+                    if self.stretch != 1.0 {
+                        self.add_stretched_ring(&mut nodes, ring, polar, weight * (piece[1] - piece[0]), &azimuth_rule);
+                        continue;
+                    }
                     self.add_ring(&mut nodes, ring, polar, weight * (piece[1] - piece[0]), &azimuth_rule);
                 }
             }
@@ -384,6 +392,47 @@ impl HalfVectorBins {
     }
 }
 
+impl HalfVectorBins {
+    /// The same for unequal roughness, where the horizon of wi has no closed form: a sector's azimuths above it are found
+    /// by bisection between steps. A half vector h = A·m/|A·m| has |det A|/|A·m|³ of the solid angle of m, and det A = 1.
+    fn add_stretched_ring(&self, nodes: &mut Vec<Node>, ring: usize, polar: f64, weight: f64, rule: &[(f64, f64)]) {
+        const STEPS: usize = 6;
+        let (sin_m, cos_m) = polar.sin_cos();
+        let scaled = |azimuth: f64| {
+            let angle = self.azimuth + azimuth;
+            DVec3::new(sin_m * angle.cos() * self.stretch, cos_m, sin_m * angle.sin() / self.stretch)
+        };
+        let height = |azimuth: f64| {
+            let h = scaled(azimuth);
+            2.0 * self.wo.dot(h) * h.y - self.wo.y * h.length_squared()
+        };
+        for i in 0..SECTORS * STEPS {
+            let step = 2.0 * PI / (SECTORS * STEPS) as f64;
+            let (mut low, mut high) = (i as f64 * step - PI, (i + 1) as f64 * step - PI);
+            let (above_low, above_high) = (height(low) > 0.0, height(high) > 0.0);
+            if above_low != above_high {
+                let (mut above, mut below) = if above_low { (low, high) } else { (high, low) };
+                for _ in 0..40 {
+                    let middle = 0.5 * (above + below);
+                    *(if height(middle) > 0.0 { &mut above } else { &mut below }) = middle;
+                }
+                *(if above_low { &mut high } else { &mut low }) = above;
+            }
+            for (x, azimuth_weight) in rule.iter().filter(|_| above_low || above_high) {
+                let h = scaled(low + (high - low) * x);
+                let length = h.length();
+                let h = h / length;
+                let cosine = self.wo.dot(h);
+                let wi = h * (2.0 * cosine) - self.wo;
+                if wi.y > 0.0 {
+                    let solid_angle = 4.0 * cosine * sin_m * weight * azimuth_weight * (high - low) / length.powi(3);
+                    nodes.push(Node { bin: ring * SECTORS + i / STEPS, wi, weight: solid_angle });
+                }
+            }
+        }
+    }
+}
+
 /// Nodes and weights on [0, 1], by Newton's steps on the Legendre polynomial.
 pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     let node = |i: usize| {
@@ -396,7 +445,11 @@ pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
                 (p0, p1) = (p1, ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k);
             }
             slope = n as f64 * (x * p1 - p0) / (x * x - 1.0);
-            x -= p1 / slope;
+            let step = p1 / slope;
+            x -= step;
+            if step.abs() < 1e-16 {
+                break;
+            }
         }
         (0.5 + 0.5 * x, 1.0 / ((1.0 - x * x) * slope * slope))
     };

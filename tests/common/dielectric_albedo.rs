@@ -30,9 +30,7 @@ pub fn refracted_cosine(cosine: f64, eta: f64) -> Option<f64> {
 /// `rule` is Gauss and Legendre's in [0, 1].
 pub fn albedo(wo: DVec3, alpha: f64, eta: f64, rule: &[(f64, f64)]) -> [f64; 2] {
     let order = rule.len();
-    let lambda = |w: DVec3| {
-        0.5 * ((1.0 + alpha * alpha * (w.x * w.x + w.z * w.z) / (w.y * w.y)).sqrt() - 1.0)
-    };
+    let lambda = |w: DVec3| 0.5 * ((1.0 + alpha * alpha * (w.x * w.x + w.z * w.z) / (w.y * w.y)).sqrt() - 1.0);
     let lambda_o = lambda(wo);
     let masked = |wi: DVec3| (1.0 + lambda_o) / (1.0 + lambda_o + lambda(wi));
     let stretched = DVec3::new(alpha * wo.x, wo.y, 0.0).normalize();
@@ -72,7 +70,7 @@ pub fn parameters(coordinates: [f64; 3], inside: bool) -> (DVec3, f64, f64) {
     let alpha = (y * y).max(2.0_f64.powi(-12));
     let contrast = CONTRASTS[0] * (CONTRASTS[1] / CONTRASTS[0]).powf(z);
     let eta = (1.0 + contrast) / (1.0 - contrast);
-    (direction(x, alpha), alpha, if inside { 1.0 / eta } else { eta })
+    (direction(x, 0.0, [alpha; 2]), alpha, if inside { 1.0 / eta } else { eta })
 }
 
 /// A table, node after node: x fastest, then y, z, and which side.

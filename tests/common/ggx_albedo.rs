@@ -1,10 +1,11 @@
-//! The directional albedo of GGX in f64, by quadrature over its visible normals: what src/prepare/ggx_albedo.bin holds.
+//! The directional albedo of GGX in f64, by quadrature over its visible normals: what src/prepare/ggx_albedo.bin and
+//! ggx_albedo_anisotropic.bin hold.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::OnceLock;
 
-use glam::DVec3;
-use sunfleck::layout::GGX_ALBEDO_SIZE;
+use glam::{DVec2, DVec3, Vec2Swizzles};
+use sunfleck::layout::{GGX_ALBEDO_SIZE, GGX_ANISOTROPIC_SIZES};
 
 use super::bsdf::gauss_legendre;
 
@@ -28,13 +29,13 @@ pub fn albedo(wo: DVec3, alpha: [f64; 2], order: usize) -> Albedo {
     let t1 = if horizontal > 0.0 { DVec3::new(-stretched.z, 0.0, stretched.x) / horizontal } else { DVec3::X };
     let t2 = t1.cross(stretched);
     let lambda_o = lambda(wo);
-    let (radial, angular) = (gauss_legendre(order), gauss_legendre(order));
+    let rule = gauss_legendre(order);
     let mut result = Albedo { white: 0.0, schlick: 0.0 };
-    for (x, radial_weight) in &radial {
+    for (x, radial_weight) in &rule {
         let (sine, cosine) = (x * FRAC_PI_2).sin_cos();
         // d(r²) = 2 sin ψ cos ψ dψ
         let weight = radial_weight * PI * sine * cosine;
-        for (y, angular_weight) in &angular {
+        for (y, angular_weight) in &rule {
             let (sin_angle, cos_angle) = (2.0 * PI * y).sin_cos();
             let (a, b) = (sine * cos_angle, sine * sin_angle);
             let s = 0.5 * (1.0 + stretched.y);
@@ -55,45 +56,98 @@ pub fn albedo(wo: DVec3, alpha: [f64; 2], order: usize) -> Albedo {
 
 /// A node of the table as stored: what `ggx_albedo` in shaders/include/ggx.glsl reads.
 pub fn entry(x: f64, y: f64, order: usize) -> [f32; 2] {
-    let alpha = (y * y).max(2.0_f64.powi(-12));
-    let wo = direction(x, alpha);
-    let a = albedo(wo, [alpha; 2], order);
-    let length = (wo.y * wo.y + alpha * alpha * (1.0 - wo.y * wo.y)).sqrt();
-    // (1 − c)⁵ is the mean of Schlick's weight for c = cos θo + length · second entry.
-    let cosine = 1.0 - (a.schlick / a.white).powf(0.2);
-    [a.white as f32, ((cosine - wo.y) / length) as f32]
+    let alpha = (y * y).max(SMALLEST_ALPHA);
+    let [white, offset] = numbers(direction(x, 0.0, [alpha; 2]), [alpha; 2], order);
+    [white as f32, offset as f32]
 }
 
-/// The direction at the table's first coordinate: the stretched direction's polar angle φ has tan(π/4 − φ/2) = x².
-pub fn direction(x: f64, alpha: f64) -> DVec3 {
+/// A node of the table of unequal roughness: (polar angle, azimuth, ratio, larger roughness), each in [0, 1]. The albedo is
+/// raised by as much as the table can be too low between its nodes, so that what is given back is never too much.
+pub fn anisotropic_entry([x, azimuth, ratio, y]: [f64; 4], order: usize) -> [i16; 2] {
+    let larger = (y * y).max(SMALLEST_ALPHA);
+    let alpha = [larger, (larger * ratio * ratio).max(SMALLEST_ALPHA)];
+    let [white, offset] = numbers(direction(x, azimuth * FRAC_PI_2, alpha), alpha, order);
+    let margin = 4e-3 * (4.0 * larger).min(1.0);
+    [(white + margin).min(1.0), offset / OFFSET_UNIT].map(|number| {
+        assert!(number.abs() <= 1.0, "{number} cannot be stored");
+        (number * SNORM).round() as i16
+    })
+}
+
+/// What a stored number is divided by.
+const SNORM: f64 = 32767.0;
+/// The largest offset is some 7, of the narrowest lobe at the horizon.
+const OFFSET_UNIT: f64 = 8.0;
+const SMALLEST_ALPHA: f64 = 1.0 / 4096.0;
+
+/// The albedo, and the offset of the cosine whose weight is the mean of Schlick's: (1 − c)⁵ for c = cos θo +
+/// |stretched wo| · offset.
+fn numbers(wo: DVec3, alpha: [f64; 2], order: usize) -> [f64; 2] {
+    let a = albedo(wo, alpha, order);
+    let length = DVec3::new(alpha[0] * wo.x, wo.y, alpha[1] * wo.z).length();
+    let cosine = 1.0 - (a.schlick / a.white).powf(0.2);
+    [a.white, (cosine - wo.y) / length]
+}
+
+/// The direction at a table's coordinates: the stretched direction's polar angle φ has tan(π/4 − φ/2) = x², and it has the
+/// given azimuth from +X on.
+pub fn direction(x: f64, azimuth: f64, alpha: [f64; 2]) -> DVec3 {
     let w = (x * x).max(1e-7);
     let (sine, cosine) = ((1.0 - w * w) / (1.0 + w * w), 2.0 * w / (1.0 + w * w));
-    let (s, c) = (sine, alpha * cosine);
-    DVec3::new(s, c, 0.0) / s.hypot(c)
+    let (s, c) = azimuth.sin_cos();
+    DVec3::new(sine * c / alpha[0], cosine, sine * s / alpha[1]).normalize()
 }
 
-/// The table as it is stored, between its nodes: what the shader's `ggx_albedo` computes.
+/// The tables as they are stored, between their nodes: what the shader's `ggx_albedo` computes.
 pub fn stored(wo: DVec3, alpha: [f64; 2]) -> Albedo {
-    static NODES: OnceLock<Vec<f64>> = OnceLock::new();
-    let nodes = NODES.get_or_init(|| {
-        let bytes = include_bytes!("../../src/prepare/ggx_albedo.bin");
-        bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]).into()).collect()
-    });
-    let size = GGX_ALBEDO_SIZE as usize;
     let [ax, az] = alpha;
-    let horizontal = (ax * wo.x).hypot(az * wo.z);
-    let length = horizontal.hypot(wo.y);
-    let x = (wo.y / (length + horizontal)).sqrt() * (size - 1) as f64;
-    let difference = 0.125 * (az * az - ax * ax) * (wo.x * wo.x - wo.z * wo.z);
-    let equal = (0.5 * (ax * ax + az * az) + difference).sqrt();
-    let y = equal.sqrt() * (size - 1) as f64;
-    let (i, j) = ((x as usize).min(size - 2), (y as usize).min(size - 2));
-    let (u, v) = (x - i as f64, y - j as f64);
-    let node = |i: usize, j: usize, k: usize| nodes[2 * (j * size + i) + k];
-    let mixed = |k| {
-        (node(i, j, k) * (1.0 - u) + node(i + 1, j, k) * u) * (1.0 - v)
-            + (node(i, j + 1, k) * (1.0 - u) + node(i + 1, j + 1, k) * u) * v
+    let horizontal = DVec2::new((ax * wo.x).abs(), (az * wo.z).abs());
+    let length = horizontal.length().hypot(wo.y);
+    let x = (wo.y / (length + horizontal.length())).sqrt();
+    let [white, offset] = if ax == az {
+        let size = GGX_ALBEDO_SIZE as usize;
+        interpolate(nodes(), [size, size], [x, ax.sqrt()])
+    } else {
+        let (larger, smaller) = (ax.max(az), ax.min(az));
+        let along = if ax < az { horizontal.yx() } else { horizontal };
+        let at = [x, along.y.atan2(along.x) / FRAC_PI_2, (smaller / larger).sqrt(), larger.sqrt()];
+        interpolate(anisotropic_nodes(), GGX_ANISOTROPIC_SIZES.map(|size| size as usize), at)
     };
-    let white = (mixed(0) + 0.065 * (ax - az).abs() / (ax + az)).min(1.0);
-    Albedo { white, schlick: white * (1.0 - wo.y - length * mixed(1)).powi(5) }
+    Albedo { white, schlick: white * (1.0 - wo.y - length * offset).powi(5) }
+}
+
+fn nodes() -> &'static [[f64; 2]] {
+    static NODES: OnceLock<Vec<[f64; 2]>> = OnceLock::new();
+    NODES.get_or_init(|| {
+        let bytes = include_bytes!("../../src/prepare/ggx_albedo.bin");
+        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]).into();
+        bytes.chunks_exact(8).map(|b| [number(b), number(&b[4..])]).collect()
+    })
+}
+
+fn anisotropic_nodes() -> &'static [[f64; 2]] {
+    static NODES: OnceLock<Vec<[f64; 2]>> = OnceLock::new();
+    NODES.get_or_init(|| {
+        let bytes = include_bytes!("../../src/prepare/ggx_albedo_anisotropic.bin");
+        let number = |b: &[u8]| f64::from(i16::from_le_bytes([b[0], b[1]])) / SNORM;
+        bytes.chunks_exact(4).map(|b| [number(b), number(&b[2..]) * OFFSET_UNIT]).collect()
+    })
+}
+
+/// Multilinear; `at` is in [0, 1], the first coordinate runs fastest.
+fn interpolate<const N: usize>(nodes: &[[f64; 2]], sizes: [usize; N], at: [f64; N]) -> [f64; 2] {
+    let mut result = [0.0; 2];
+    for corner in 0..1 << N {
+        let (mut index, mut stride, mut weight) = (0, 1, 1.0);
+        for axis in 0..N {
+            let place = at[axis] * (sizes[axis] - 1) as f64;
+            let cell = (place as usize).min(sizes[axis] - 2);
+            let upper = corner >> axis & 1;
+            index += stride * (cell + upper);
+            stride *= sizes[axis];
+            weight *= if upper == 1 { place - cell as f64 } else { 1.0 - (place - cell as f64) };
+        }
+        (0..2).for_each(|k| result[k] += weight * nodes[index][k]);
+    }
+    result
 }

@@ -54,14 +54,29 @@ fn configurations() -> Vec<Configuration> {
             });
         }
     }
+    all.extend(strongly_anisotropic());
     let lambertian = |cosine| Configuration::new(BSDF_LAMBERTIAN, [0.8, 0.5, 0.2], direction(cosine, 4.0));
     all.extend([1.0, 0.4, 1e-6].map(lambertian));
     all
 }
 
+/// Full roughness along one axis, and a sixteenth or a sixty-fourth of it along the other.
+fn strongly_anisotropic() -> Vec<Configuration> {
+    let mut all = Vec::new();
+    for (i, stretch) in [4.0_f32, 0.25, 8.0].into_iter().enumerate() {
+        for (j, cosine) in [1.0, 0.7, 0.2].into_iter().enumerate() {
+            let alpha = stretch.min(1.0 / stretch);
+            let wo = direction(cosine, 0.2 + (i + 2 * j) as f64);
+            let plain = Configuration::metallic_roughness(0.0, [1.0, 0.0][j % 2], 1.5, 0.4, wo);
+            all.push(Configuration { alpha, stretch, ..plain });
+        }
+    }
+    all
+}
+
 fn bins(c: &Configuration) -> HalfVectorBins {
     let alpha = if c.kind == BSDF_METALLIC_ROUGHNESS { f64::from(c.alpha) } else { 0.0 };
-    HalfVectorBins::new(alpha, c.wo)
+    HalfVectorBins::new(alpha, c.stretch.into(), c.wo)
 }
 
 /// Bins above the surface, then as many below it.
@@ -273,28 +288,38 @@ fn a_single_scattering_loses_light() {
     assert!((single - (1.0 - 2.0_f64.ln())).abs() < 1e-3, "{single}");
 }
 
-/// Anisotropic metals never give back more than they get; what the table, made for equal roughness, does not know of them
-/// is lost.
+/// A white furnace for unequal roughness, from nearly round lobes to grooves, for metals and dielectrics.
 #[test]
-fn anisotropic_lobes_conserve_energy() {
+fn anisotropic_lobes_give_back_what_they_get() {
     let mut configurations = Vec::new();
-    for (roughness, stretch) in [(0.3, 1.5), (0.3, 0.6), (0.6, 1.3), (0.6, 0.7), (0.85, 1.17), (0.5, 2.0), (0.9, 1.1)] {
-        for (i, cosine) in [1.0, 0.6, 0.3, 0.1].into_iter().enumerate() {
-            for azimuth in [0.0, 0.8, 1.57] {
-                let wo = direction(cosine, azimuth + 0.01 * i as f64);
-                let metal = Configuration::metallic_roughness(roughness, 1.0, 1.5, 0.0, wo);
-                configurations.push(Configuration { color: [1.0; 3], stretch, ..metal });
+    for larger in [0.1_f32, 0.4, 1.0] {
+        for ratio in [1.2_f32, 2.0, 4.0, 16.0, 64.0] {
+            for (i, cosine) in [1.0, 0.6, 0.3, 0.1].into_iter().enumerate() {
+                for (j, azimuth) in [0.0, 0.8, 1.57].into_iter().enumerate() {
+                    let turned = (i + j) % 2 == 0;
+                    let azimuth = if turned { azimuth } else { 1.57 - azimuth };
+                    let stretch = if turned { ratio.sqrt() } else { 1.0 / ratio.sqrt() };
+                    let (metallic, transmission) = [(1.0, 0.0), (0.0, 0.0), (0.5, 0.0), (0.0, 0.6)][(i + 2 * j) % 4];
+                    let white =
+                        Configuration::metallic_roughness(0.0, metallic, 1.5, transmission, direction(cosine, azimuth));
+                    configurations.push(Configuration {
+                        color: [1.0; 3],
+                        alpha: larger / ratio.sqrt(),
+                        stretch,
+                        ..white
+                    });
+                }
             }
         }
     }
     let mut worst = [0.0_f64; 2];
     for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
+        let slack = c.rounding(c.wo);
         let albedo = luminance(integrals.albedo) - 1.0;
-        println!("{:?} {:.2} {:+.2e}", c.alphas(), c.wo.y, albedo);
-        worst = [worst[0].min(albedo), worst[1].max(albedo)];
+        worst = [worst[0].min(albedo + slack), worst[1].max(albedo - slack)];
+        assert!(albedo <= 1e-3 + slack && albedo >= -1e-2 - slack, "{:?} {c:?}: 1 {albedo:+.2e}", c.alphas());
     }
-    println!("albedo of white anisotropic metals: 1 {:+.2e} to 1 {:+.2e}", worst[0], worst[1]);
-    assert!(worst[1] <= 1e-3 && worst[0] > -0.07, "{worst:?}");
+    println!("albedo of white anisotropic surfaces: 1 {:+.2e} to 1 {:+.2e}", worst[0], worst[1]);
 }
 
 /// At directions that were scattered: the density that came with a sample is the one that is evaluated, and the weight is

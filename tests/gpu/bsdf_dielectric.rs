@@ -5,8 +5,8 @@
 use std::f64::consts::PI;
 
 use crate::common::bsdf::{
-    Configuration, SCATTERED_DELTA, SCATTERED_THROUGH, Sample, Value, dielectric_kernel, direction, evaluate, luminance,
-    scatter,
+    Configuration, SCATTERED_DELTA, SCATTERED_THROUGH, Sample, Value, dielectric_kernel, direction, evaluate,
+    luminance, scatter,
 };
 use crate::common::dielectric_albedo::{Table, fresnel, refracted_cosine};
 use crate::common::kernel::TestKernel;
@@ -312,7 +312,8 @@ fn check(c: &Configuration, sample: &Sample, value: &Value) {
 #[test]
 fn smooth_boundaries_follow_fresnel_and_snell() {
     let mut configurations = Vec::new();
-    for (roughness, eta) in [(0.0, 1.5), (0.0, 1.0 / 1.5), (0.5, 1.0001), (1.0, 1.0), (0.5, 1.0 / 1.0001), (0.01, 3.0)] {
+    for (roughness, eta) in [(0.0, 1.5), (0.0, 1.0 / 1.5), (0.5, 1.0001), (1.0, 1.0), (0.5, 1.0 / 1.0001), (0.01, 3.0)]
+    {
         for cosine in [1.0, 0.6, 0.2, 0.01] {
             configurations.push(boundary(roughness, eta, direction(cosine, 1.0)));
         }

@@ -5,6 +5,7 @@ mod common;
 
 mod agreement;
 mod alpha;
+mod anisotropy;
 mod attributes;
 mod bsdf_chi_square;
 mod bsdf_delta;

@@ -112,6 +112,18 @@ mutations! {
     unmirrored_bitangent: "include/attributes.glsl",
         "bitangent_sign = -bitangent_sign;" => "bitangent_sign = bitangent_sign;",
         caught by "attributes::attributes_go_with_their_instance";
+    /// Rough across the direction, not along it.
+    swapped_anisotropy: "include/anisotropy.glsl",
+        "alpha.x += (1.0 - alpha.x) * strength * strength" => "alpha.y += (1.0 - alpha.y) * strength * strength",
+        caught by "anisotropy::tangents_turn_the_rough_direction";
+    /// The texture's direction turned clockwise.
+    clockwise_anisotropy: "include/anisotropy.glsl",
+        "own.x * direction.y + own.y * direction.x" => "own.x * direction.y - own.y * direction.x",
+        caught by "anisotropy::the_texture_gives_direction_and_strength";
+    /// The albedo of a surface whose grooves run the other way.
+    albedo_of_other_grooves: "include/ggx.glsl",
+        "if (alpha.x < alpha.y) horizontal" => "if (alpha.x > alpha.y) horizontal",
+        caught by "bsdf_chi_square::anisotropic_lobes_give_back_what_they_get";
 }
 
 /// A call of a shader function and a render pass with the same sources read from a folder: what fails is the mutant.

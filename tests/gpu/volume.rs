@@ -118,10 +118,10 @@ fn boundaries_reflect_by_both_of_their_media() {
     let (glass, water) = (medium(1.8, [0.9, 0.6, 0.3], 0.5), medium(1.2, [0.5, 0.8, 0.9], 0.5));
     let through = |m: &Material, way| transmittance(m.volume.unwrap(), way);
     let plain = seen_straight(slab(1.0, -1.0, 0), vec![glass.clone()], 4.0);
-    let expected: [f64; 3] =
-        std::array::from_fn(|k| layers(&[1.0, 1.8, 1.0], &[through(&glass, 2.0)[k]]).iter().sum());
+    let expected: [f64; 3] = std::array::from_fn(|k| layers(&[1.0, 1.8, 1.0], &[through(&glass, 2.0)[k]]).iter().sum());
     assert_close("a slab", mean(&plain, 1 << 16), expected, 2e-3);
-    let filled = seen_straight([slab(1.0, -1.0, 0), slab(0.5, -0.5, 1)].concat(), vec![glass.clone(), water.clone()], 4.0);
+    let filled =
+        seen_straight([slab(1.0, -1.0, 0), slab(0.5, -0.5, 1)].concat(), vec![glass.clone(), water.clone()], 4.0);
     let expected: [f64; 3] = std::array::from_fn(|k| {
         let (wall, inside) = (through(&glass, 0.5)[k], through(&water, 1.0)[k]);
         layers(&[1.0, 1.8, 1.2, 1.8, 1.0], &[wall, inside, wall]).iter().sum()

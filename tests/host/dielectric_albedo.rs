@@ -40,7 +40,8 @@ fn write(path: &Path) {
         })
         .collect();
     println!("nodes are made");
-    let deficit = |(point, inside, exact): &([f64; 3], bool, [f64; 2])| exact[0] - table.interpolate(*point, *inside)[0];
+    let deficit =
+        |(point, inside, exact): &([f64; 3], bool, [f64; 2])| exact[0] - table.interpolate(*point, *inside)[0];
     between.sort_by(|a, b| deficit(b).total_cmp(&deficit(a)));
     for (point, inside, exact) in &between {
         let now = table.interpolate(*point, *inside);
@@ -71,7 +72,9 @@ fn the_table_holds_what_the_quadrature_gives() {
         (0..4000).map(|i| (std::array::from_fn(|_| random.unit()), i % 2 == 0)).collect();
     let errors: Vec<(f64, [f64; 3], bool)> = points
         .into_par_iter()
-        .map(|(at, inside)| (Table::stored().interpolate(at, inside)[0] / exact(at, inside, &rule)[0] - 1.0, at, inside))
+        .map(|(at, inside)| {
+            (Table::stored().interpolate(at, inside)[0] / exact(at, inside, &rule)[0] - 1.0, at, inside)
+        })
         .collect();
     for inside in [false, true] {
         let mut of_side: Vec<f64> = errors.iter().filter(|e| e.2 == inside).map(|e| e.0).collect();

@@ -5,10 +5,10 @@ mod common;
 
 mod bench;
 mod bench_rows;
+mod dielectric_albedo;
 mod film_images;
 mod film_metrics;
 mod film_sums;
-mod dielectric_albedo;
 mod ggx_albedo;
 mod prepare_alpha;
 mod prepare_bvh;

@@ -295,3 +295,40 @@ fn a_primitive_without_coordinates_stays_without_tangents() {
     triangle.generate_tangents(0, &TextureTransform::IDENTITY);
     assert!(triangle.tangents.is_none());
 }
+
+fn anisotropic(extension: Value) -> Value {
+    json!({"extensions": {"KHR_materials_anisotropy": extension}})
+}
+
+/// KHR_materials_anisotropy is read and gets tangents, along the coordinates of its texture, without a normal map.
+#[test]
+fn anisotropy_and_its_tangents() {
+    let coordinates = [("TEXCOORD_0", vec2(QUAD_UV))];
+    let info = json!({"index": 0, "extensions": {"KHR_texture_transform": {"rotation": FRAC_PI_2}}});
+    let full = json!({"anisotropyStrength": 0.6, "anisotropyRotation": -FRAC_PI_2, "anisotropyTexture": info});
+    let scene = load_ok(&quad(&coordinates, anisotropic(full)));
+    let material = &scene.materials[0];
+    assert_eq!(material.anisotropy, 0.6);
+    assert!((f64::from(material.anisotropy_rotation_radians) - 1.5 * PI).abs() < 1e-6);
+    assert!(material.anisotropy_texture.is_some());
+    let tangent = primitive(&scene).tangents.as_ref().expect("tangents")[0];
+    assert!((0..4).all(|k| (tangent[k] - [0.0, -1.0, 0.0, 1.0][k]).abs() < 1e-6), "{tangent:?}");
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    // Without a texture they run along the first set.
+    let scene = load_ok(&quad(&coordinates, anisotropic(json!({"anisotropyStrength": 1}))));
+    assert_eq!(primitive(&scene).tangents.as_ref().expect("tangents")[0], [1.0, 0.0, 0.0, 1.0]);
+    // The default strength is 0: nothing is needed.
+    let scene = load_ok(&quad(&coordinates, anisotropic(json!({"anisotropyRotation": 1}))));
+    assert!(primitive(&scene).tangents.is_none() && scene.materials[0].anisotropy == 0.0);
+}
+
+#[test]
+fn anisotropy_without_a_direction_is_named() {
+    let scene = load_ok(&quad(&[], anisotropic(json!({"anisotropyStrength": 1}))));
+    assert!(primitive(&scene).tangents.is_none());
+    assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("has no direction"), "{:?}", scene.warnings);
+    for (key, value) in [("anisotropyStrength", 1.5), ("anisotropyStrength", -0.1)] {
+        let error = load_error(&quad(&[], anisotropic(json!({key: value})))).to_string();
+        assert!(error.contains(key), "{error}");
+    }
+}

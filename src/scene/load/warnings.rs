@@ -1,5 +1,9 @@
 //! Warnings of a loader: one line for each feature that is not covered, however often the file uses it.
 
+/// Anisotropy runs along tangents, and those along texture coordinates.
+pub(super) const NO_DIRECTION: &str =
+    "anisotropy on meshes without tangents and texture coordinates has no direction: their highlights are round";
+
 /// Collects what could not be honoured, one entry a subject.
 #[derive(Default)]
 pub(super) struct Warnings {

@@ -4,6 +4,8 @@
 //! `{"sunfleck": {"bsdf": "lambertian" | "mirror" | "refract" | "glass", "fresnel": "exact" | "schlick",
 //! "black_back": true | false}}`; their colour is the base colour, their index of refraction KHR_materials_ior's.
 
+use std::f64::consts::TAU;
+
 use super::Loader;
 use super::json::Json;
 use crate::scene::{AlphaMode, Bsdf, Fresnel, Material, SceneResult, TextureBinding, TextureTransform, Volume};
@@ -53,6 +55,7 @@ impl Loader<'_> {
         if material.bsdf == Bsdf::MetallicRoughness {
             self.read_specular(place, &mut material, has_texcoords)?;
             self.read_transmission(place, &mut material, has_texcoords)?;
+            self.read_anisotropy(place, &mut material, has_texcoords)?;
         }
         material.volume = read_volume(place, &material)?;
         self.warn_of_material(place)?;
@@ -167,6 +170,22 @@ impl Loader<'_> {
         if material.specular > 0.0 {
             material.specular_texture = self.texture(extension.get("specularTexture")?, has_texcoords)?;
             material.specular_color_texture = self.texture(extension.get("specularColorTexture")?, has_texcoords)?;
+        }
+        Ok(())
+    }
+
+    fn read_anisotropy(
+        &mut self,
+        place: &Json<'_>,
+        material: &mut Material,
+        has_texcoords: [bool; 2],
+    ) -> SceneResult<()> {
+        let Some(extension) = place.extension("KHR_materials_anisotropy")? else { return Ok(()) };
+        material.anisotropy = extension.number_in("anisotropyStrength", 0.0, 0.0, 1.0)? as f32;
+        if material.anisotropy > 0.0 {
+            let rotation = extension.number_or("anisotropyRotation", 0.0)?;
+            material.anisotropy_rotation_radians = rotation.rem_euclid(TAU) as f32;
+            material.anisotropy_texture = self.texture(extension.get("anisotropyTexture")?, has_texcoords)?;
         }
         Ok(())
     }

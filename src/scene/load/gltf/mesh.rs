@@ -4,6 +4,7 @@ use super::Loader;
 use super::accessor::Accessor;
 use super::attributes::AttributeReader;
 use super::json::Json;
+use crate::scene::load::warnings::NO_DIRECTION;
 use crate::scene::{Mesh, Primitive, SceneResult};
 
 /// How a list of vertices forms triangles.
@@ -75,6 +76,9 @@ impl Loader<'_> {
             primitive.tangents = if primitive.normals.is_some() { reader.tangents(self)? } else { None };
             if primitive.tangents.is_none() {
                 primitive.generate_tangents(set, &transform);
+            }
+            if primitive.tangents.is_none() && self.scene.materials[material].anisotropy > 0.0 {
+                self.warnings.add(NO_DIRECTION, &place.pointer);
             }
         }
         Ok(Some(primitive))

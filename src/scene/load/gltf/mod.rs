@@ -7,8 +7,8 @@
 //!   cycles are refused.
 //! - Triangles, strips and fans; points and lines have no surface and are skipped with a warning.
 //! - Extensions: KHR_lights_punctual (a light's `range` is ignored: light falls off by the square of the distance, to
-//!   infinity), KHR_materials_emissive_strength, _ior, _specular, _unlit, _transmission (thin-walled), KHR_mesh_quantization,
-//!   KHR_texture_transform, EXT_texture_webp; KHR_materials_variants shows its default.
+//!   infinity), KHR_materials_anisotropy, _emissive_strength, _ior, _specular, _unlit, _transmission, _volume,
+//!   KHR_mesh_quantization, KHR_texture_transform, EXT_texture_webp; KHR_materials_variants shows its default.
 //! - Extras: `sunfleck` on a material (`material.rs`), a camera (`camera.rs`) and a scene (`extras.rs`).
 //! - Everything else that changes the picture is named in [`Scene::warnings`]; if the file requires it, it is an error.
 
@@ -38,6 +38,7 @@ use crate::scene::{Scene, SceneResult};
 /// What a file may require. KHR_materials_variants only adds alternatives to a valid default.
 const SUPPORTED: &[&str] = &[
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",

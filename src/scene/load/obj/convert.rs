@@ -42,9 +42,6 @@ pub(super) fn convert(name: &str, mtl: &MtlMaterial, textures: &mut Textures, wa
     if let Some(bump) = mtl.bump_texture.as_ref().filter(|bump| mtl.normal_texture.is_none() && !bump.file.exists()) {
         warn(&format!("the bump map {} does not exist: it is ignored", bump.file.display()));
     }
-    if material.anisotropy > 0.0 {
-        warn("aniso is not supported yet: the highlight is round");
-    }
     for statement in &mtl.ignored {
         warn(&format!("{statement} is not supported yet and ignored{}", why_ignored(statement)));
     }

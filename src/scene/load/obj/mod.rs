@@ -26,7 +26,7 @@ use self::material::MtlMaterial;
 use self::parse::{Corner, Face, Geometry};
 use self::textures::Textures;
 use super::file;
-use super::warnings::Warnings;
+use super::warnings::{NO_DIRECTION, Warnings};
 use crate::scene::{Instance, Material, Mesh, Primitive, Scene, SceneError, SceneResult};
 
 /// Reads an OBJ file and the material libraries it names.
@@ -66,8 +66,21 @@ pub(super) fn load(path: &Path) -> SceneResult<Scene> {
     let images: Vec<SceneResult<_>> = pending.par_iter().map(textures::decode).collect();
     scene.images = images.into_iter().collect::<SceneResult<_>>()?;
     textures::drop_heights(&mut scene, &pending, &mut warnings);
+    generate_tangents(&mut scene, &mut warnings);
     scene.warnings = warnings.into_lines();
     Ok(scene)
+}
+
+/// Tangents for the materials that need them, once it is known which maps are of normals.
+fn generate_tangents(scene: &mut Scene, warnings: &mut Warnings) {
+    for primitive in scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
+        let material = &scene.materials[primitive.material];
+        let Some((set, transform)) = material.tangent_coordinates() else { continue };
+        primitive.generate_tangents(set, &transform);
+        if primitive.tangents.is_none() && material.anisotropy > 0.0 {
+            warnings.add(NO_DIRECTION, format!("\"{}\"", material.name));
+        }
+    }
 }
 
 /// UTF-16 by its byte order mark, else UTF-8; what is not valid becomes U+FFFD and is refused where it matters.
