@@ -7,6 +7,7 @@ pub mod bsdf;
 pub mod builder;
 pub mod ggx_albedo;
 pub mod gpu;
+pub mod half_vector_bins;
 pub mod irradiance;
 pub mod kernel;
 pub mod mutation;
