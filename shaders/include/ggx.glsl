@@ -72,12 +72,12 @@ GgxAlbedo ggx_albedo_of(vec2 entry, float cos_o, float stretched) {
     return GgxAlbedo(entry.x, entry.x * squared * squared * remaining);
 }
 
-// What the second number of the table below is stored in units of.
-const float GGX_OFFSET_UNIT = 8.0;
+// What the two numbers of the table below are stored in units of.
+const vec2 GGX_ANISOTROPIC_UNITS = vec2(2.0, 8.0);
 
 // Where the two roughnesses differ, the azimuth of the stretched direction and √(smaller/larger) are coordinates too, and
 // √larger takes the place of √α. The direction that is stretched by both resolves what happens when one sees along the
-// grooves, however deep they are: the table is good to half a percent at every ratio. Texels hold the four nodes of a cell
+// grooves, however deep they are: the table is good to a percent at every ratio. Texels hold the four nodes of a cell
 // of polar angle and azimuth.
 vec2 ggx_anisotropic_cell(uint cell, vec2 f) {
     uvec4 nodes = LOAD4(TABLES, cell);
@@ -100,7 +100,7 @@ GgxAlbedo ggx_anisotropic_albedo(uint table, vec3 wo, vec2 alpha) {
     uint next = first + GGX_ANISOTROPIC_SIZES.z * row;
     vec2 low = mix(ggx_anisotropic_cell(first, f.xy), ggx_anisotropic_cell(first + row, f.xy), f.z);
     vec2 high = mix(ggx_anisotropic_cell(next, f.xy), ggx_anisotropic_cell(next + row, f.xy), f.z);
-    return ggx_albedo_of(mix(low, high, f.w) * vec2(1.0, GGX_OFFSET_UNIT), wo.y, stretched);
+    return ggx_albedo_of(mix(low, high, f.w) * GGX_ANISOTROPIC_UNITS, wo.y, stretched);
 }
 
 // Coordinates of the albedo tables for equal roughness, in [0, 1]: the polar angle φ of the direction stretched by the roughness, as

@@ -8,7 +8,7 @@ use crate::layout::{DIELECTRIC_ALBEDO_SIZE, GGX_ALBEDO_SIZE, GGX_ANISOTROPIC_SIZ
 /// Node (x, y) is two little-endian f32 at (y · size + x): the albedo, and the offset of Schlick's mean cosine.
 const NODES: &[u8] = include_bytes!("ggx_albedo.bin");
 
-/// For unequal roughness: a node is the same two numbers as little-endian i16, in units of 1/32767 and 8/32767; the first
+/// For unequal roughness: a node is the same two numbers as little-endian i16, in units of 2/32767 and 8/32767; the first
 /// coordinate runs fastest.
 const ANISOTROPIC_NODES: &[u8] = include_bytes!("ggx_albedo_anisotropic.bin");
 

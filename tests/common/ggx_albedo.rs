@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3, Vec2Swizzles};
 use sunfleck::layout::{GGX_ALBEDO_SIZE, GGX_ANISOTROPIC_SIZES};
 
-use super::bsdf::gauss_legendre;
+use super::half_vector_bins::gauss_legendre;
 
 /// Albedo of the single-scattering lobe towards a direction.
 #[derive(Clone, Copy, Debug)]
@@ -67,8 +67,8 @@ pub fn anisotropic_entry([x, azimuth, ratio, y]: [f64; 4], order: usize) -> [i16
     let larger = (y * y).max(SMALLEST_ALPHA);
     let alpha = [larger, (larger * ratio * ratio).max(SMALLEST_ALPHA)];
     let [white, offset] = numbers(direction(x, azimuth * FRAC_PI_2, alpha), alpha, order);
-    let margin = 4e-3 * (4.0 * larger).min(1.0);
-    [(white + margin).min(1.0), offset / OFFSET_UNIT].map(|number| {
+    let margin = 1.2e-3 + 5e-3 * (4.0 * larger).min(1.0);
+    [white * (1.0 + margin) / UNITS[0], offset / UNITS[1]].map(|number| {
         assert!(number.abs() <= 1.0, "{number} cannot be stored");
         (number * SNORM).round() as i16
     })
@@ -76,8 +76,9 @@ pub fn anisotropic_entry([x, azimuth, ratio, y]: [f64; 4], order: usize) -> [i16
 
 /// What a stored number is divided by.
 const SNORM: f64 = 32767.0;
-/// The largest offset is some 7, of the narrowest lobe at the horizon.
-const OFFSET_UNIT: f64 = 8.0;
+/// Of the table of unequal roughness: what is raised passes 1, and the largest offset is some 7, of the narrowest lobe at
+/// the horizon.
+const UNITS: [f64; 2] = [2.0, 8.0];
 const SMALLEST_ALPHA: f64 = 1.0 / 4096.0;
 
 /// The albedo, and the offset of the cosine whose weight is the mean of Schlick's: (1 − c)⁵ for c = cos θo +
@@ -130,7 +131,7 @@ fn anisotropic_nodes() -> &'static [[f64; 2]] {
     NODES.get_or_init(|| {
         let bytes = include_bytes!("../../src/prepare/ggx_albedo_anisotropic.bin");
         let number = |b: &[u8]| f64::from(i16::from_le_bytes([b[0], b[1]])) / SNORM;
-        bytes.chunks_exact(4).map(|b| [number(b), number(&b[2..]) * OFFSET_UNIT]).collect()
+        bytes.chunks_exact(4).map(|b| [number(b) * UNITS[0], number(&b[2..]) * UNITS[1]]).collect()
     })
 }
 

@@ -8,6 +8,7 @@ pub mod builder;
 pub mod dielectric_albedo;
 pub mod ggx_albedo;
 pub mod gpu;
+pub mod half_vector_bins;
 pub mod irradiance;
 pub mod kernel;
 pub mod mutation;

@@ -38,8 +38,9 @@ fn the_table_holds_what_the_quadrature_gives() {
     });
 }
 
-/// Nodes along each axis of the disk for unequal roughness; with half of them the table changes by less than 1e-4.
-const ANISOTROPIC_ORDER: usize = 64;
+/// Nodes along each axis of the disk for unequal roughness; with three quarters of them the albedo changes by less than
+/// 5e-4, and the offset by less than 0.1 (at the horizon, where its unit is short).
+const ANISOTROPIC_ORDER: usize = 128;
 
 fn anisotropic_coordinates(i: usize) -> [f64; 4] {
     let mut rest = i;
@@ -65,9 +66,11 @@ fn the_anisotropic_table_holds_what_the_quadrature_gives() {
     // Every 97th node: 97 and the sizes have no common divisor, so that all of each coordinate have their turn.
     (0..nodes).into_par_iter().step_by(97).for_each(|i| {
         let at = anisotropic_coordinates(i);
-        let fresh = anisotropic_entry(at, ANISOTROPIC_ORDER / 2 + 7);
+        let fresh = anisotropic_entry(at, 3 * ANISOTROPIC_ORDER / 4);
         for (k, (a, b)) in stored[2 * i..2 * i + 2].iter().zip(fresh).enumerate() {
-            assert!((i32::from(*a) - i32::from(b)).abs() <= 10, "node {at:?}, value {k}: {a} is stored, {b} is right");
+            let tolerance = [8, 410][k];
+            let difference = (i32::from(*a) - i32::from(b)).abs();
+            assert!(difference <= tolerance, "node {at:?}, value {k}: {a} is stored, {b} is right");
         }
     });
 }
@@ -80,7 +83,7 @@ fn the_anisotropic_table_is_good_between_its_nodes() {
     for ratios in octaves.windows(2) {
         let mut random = Random(ratios[1].to_bits());
         let mut draw = || random.unit();
-        let errors: Vec<f64> = (0..1 << 11)
+        let points: Vec<_> = (0..1 << 11)
             .map(|i| {
                 let larger = if i % 2 == 0 { draw() } else { draw().powi(2) }.max(2.0_f64.powi(-12));
                 let ratio = 1.0 / (ratios[0] + (ratios[1] - ratios[0]) * draw());
@@ -91,7 +94,8 @@ fn the_anisotropic_table_is_good_between_its_nodes() {
                 let azimuth = FRAC_PI_2 * if i % 3 == 0 { (1.0 - 2.0 * ratio * draw()).max(0.0) } else { draw() };
                 (alpha, cosine, azimuth)
             })
-            .collect::<Vec<_>>()
+            .collect();
+        let errors: Vec<f64> = points
             .into_par_iter()
             .map(|(alpha, cosine, azimuth)| {
                 let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
