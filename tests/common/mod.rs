@@ -9,6 +9,7 @@ pub mod ggx_albedo;
 pub mod gpu;
 pub mod irradiance;
 pub mod kernel;
+pub mod mitsuba_bsdfs;
 pub mod mutation;
 pub mod random;
 pub mod reference;

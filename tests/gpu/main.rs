@@ -15,6 +15,7 @@ mod error_estimate;
 mod furnace;
 mod layout;
 mod light_sampling;
+mod mitsuba_bsdfs;
 mod mutations;
 mod sampler;
 mod shader_math;
