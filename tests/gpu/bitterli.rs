@@ -119,14 +119,14 @@ fn smooth_pairs(
     pairs.filter_map(|(_, (a, b))| Some((a, b?))).unzip()
 }
 
-/// Tile by tile, and all smooth tiles together, channel mixed.
-fn compare(what: &str, (ours, theirs): &(Vec<Estimate>, Vec<Estimate>)) -> Comparison {
+/// Whether two lists of tiles agree: one by one, and in the mean of all (with the channels mixed).
+fn agree(what: &str, (ours, theirs): &(Vec<Estimate>, Vec<Estimate>)) -> bool {
     let [a, b] = [ours, theirs].map(|e| Estimate::mean_of_independent(e.iter().copied()));
     let ratio = a.mean / b.mean;
     let error = ratio * a.relative_error().hypot(b.relative_error());
     let comparison = Comparison::new(ours, theirs, 0.01);
     println!("{what}: ratio of the means {ratio:.5} ± {error:.5}; tiles: {comparison}");
-    comparison
+    comparison.passed() && a.deviation(&b) < 4.0
 }
 
 /// Diffuse, with 64 bounces there and all here: nothing differs but the filter.
@@ -136,8 +136,7 @@ fn cornell_box_agrees_with_its_reference() {
     let mut scene = subject.scene();
     let pairs = smooth_pairs(&subject, &subject.render(&scene, 16, 16), |_, _| true);
     assert!(pairs.0.len() > 3 * 700, "only {} smooth tiles", pairs.0.len() / 3);
-    let comparison = compare(subject.name, &pairs);
-    assert!(comparison.passed(), "{comparison}");
+    assert!(agree(subject.name, &pairs));
 
     // A white that is 2 % too dark is noticed.
     scene
@@ -146,12 +145,17 @@ fn cornell_box_agrees_with_its_reference() {
         .filter(|m| m.name != "Light")
         .for_each(|m| m.base_color = m.base_color.map(|c| 0.98 * c));
     let darker = smooth_pairs(&subject, &subject.render(&scene, 16, 4), |_, _| true);
-    assert!(!compare("2 % darker", &darker).passed());
+    assert!(!agree("2 % darker", &darker));
 }
 
 /// Where the plates are (column and row as parts of the image).
 fn is_plate(x: f64, y: f64) -> bool {
     (0.1..0.9).contains(&x) && y > 0.35
+}
+
+/// Where the lamps are. They are known, and so bright that they would be all of a mean.
+fn is_lamp(x: f64, y: f64) -> bool {
+    (0.3..0.75).contains(&x) && y < 0.35
 }
 
 /// Direct light alone. The plates have Beckmann's distribution there and GGX here: what is around them is compared with
@@ -160,15 +164,13 @@ fn is_plate(x: f64, y: f64) -> bool {
 fn veach_mis_agrees_around_its_plates_and_everywhere_with_mitsuba() {
     let Some(subject) = Subject::new("veach-mis", [160, 90], 5, Some(1)) else { return };
     let ours = subject.render(&subject.scene(), 16, 16);
-    let pairs = smooth_pairs(&subject, &ours, |x, y| !is_plate(x, y));
-    assert!(pairs.0.len() > 3 * 200, "only {} smooth tiles", pairs.0.len() / 3);
-    let comparison = compare("veach-mis, around the plates", &pairs);
-    assert!(comparison.passed(), "{comparison}");
+    let pairs = smooth_pairs(&subject, &ours, |x, y| !is_plate(x, y) && !is_lamp(x, y));
+    assert!(pairs.0.len() > 3 * 150, "only {} smooth tiles", pairs.0.len() / 3);
+    assert!(agree("veach-mis, walls and floor", &pairs));
 
     let mitsuba = Reference::read("veach_mis_ggx.exr").tiles;
-    let comparison = compare("veach-mis, metals of GGX", &(ours.tiles(), mitsuba));
-    assert!(comparison.passed(), "{comparison}");
+    assert!(agree("veach-mis, metals of GGX", &(ours.tiles(), mitsuba)));
 
     let everywhere = smooth_pairs(&subject, &ours, |_, _| true);
-    assert!(!compare("veach-mis, plates of Beckmann", &everywhere).passed(), "Beckmann's plates cannot be GGX's");
+    assert!(!agree("veach-mis, plates of Beckmann", &everywhere), "Beckmann's plates cannot be GGX's");
 }
