@@ -26,7 +26,7 @@ SPHERE_SUBDIVISIONS = 3
 
 
 class NotCovered(Exception):
-    """The scene has something that is not translated; the message names it."""
+    """The scene has something that is not translated, or lacks something; the message names it."""
 
 
 def numbers(text):
@@ -43,6 +43,14 @@ def properties(element):
             found[child.get("name")] = numbers(child.get("value"))
         elif child.tag == "string":
             found[child.get("name")] = child.get("value")
+    return found
+
+
+def part(element, tag):
+    """The child that an element must have."""
+    found = element.find(tag)
+    if found is None:
+        raise NotCovered(f"a {element.tag} without <{tag}>")
     return found
 
 
@@ -107,7 +115,7 @@ def material(scene, bsdf, emission):
 
 
 def add_shape(scene, element, bsdfs):
-    name, emitter = element.find("ref").get("id"), element.find("emitter")
+    name, emitter = part(element, "ref").get("id"), element.find("emitter")
     if emitter is not None and emitter.get("type") != "area":
         raise NotCovered(f"the emitter {emitter.get('type')}")
     emission = None if emitter is None else properties(emitter)["radiance"]
@@ -116,7 +124,7 @@ def add_shape(scene, element, bsdfs):
 
 def add_camera(scene, sensor):
     """The field of view is the horizontal one. Mitsuba's camera looks along +Z with +X to the left, glTF's along −Z."""
-    film = properties(sensor.find("film"))
+    film = properties(part(sensor, "film"))
     aspect = film["width"] / film["height"]
     yfov = 2 * math.atan(math.tan(math.radians(properties(sensor)["fov"]) / 2) / aspect)
     scene.doc["cameras"] = [{"type": "perspective", "perspective": {"yfov": yfov, "aspectRatio": aspect, "znear": 0.01}}]
@@ -129,7 +137,7 @@ def translate(path):
     bsdfs = {bsdf.get("id"): bsdf for bsdf in root.findall("bsdf")}
     scene = generate.Scene()
     scene.doc["asset"]["generator"] = "sunfleck tests/reference/bitterli.py"
-    add_camera(scene, root.find("sensor"))
+    add_camera(scene, part(root, "sensor"))
     for element in root.findall("shape"):
         add_shape(scene, element, bsdfs)
     uri = "data:application/octet-stream;base64," + b64encode(scene.data).decode()
@@ -144,6 +152,8 @@ def main() -> None:
         text = json.dumps(translate(sys.argv[1]), indent=1)
     except (NotCovered, OSError, ElementTree.ParseError) as error:
         sys.exit(f"error: {sys.argv[1]}: {error}")
+    except KeyError as error:
+        sys.exit(f"error: {sys.argv[1]}: there is no {error}")
     Path(sys.argv[2]).write_text(text + "\n", encoding="utf-8")
 
 

@@ -83,6 +83,8 @@ def region_means(image):
 def main() -> None:
     if len(sys.argv) != 2:
         sys.exit(f"usage: {sys.argv[0]} FOLDER")
+    if not (Path(sys.argv[1]) / "veach-mis" / "scene.xml").is_file():
+        sys.exit(f"error: {sys.argv[1]} has no veach-mis/scene.xml")
     enter_environment(__file__)
     import drjit
     import mitsuba as mi
