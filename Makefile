@@ -38,8 +38,10 @@ lint: deps ## formatting, clippy and the documentation's links
 	cargo clippy --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items
 
-references: ## renders the reference images again with Mitsuba 3 (a quarter of an hour)
+references: ## makes the reference images and values again with Mitsuba 3 (a quarter of an hour)
 	python3 tests/reference/make_references.py
+	python3 tests/reference/make_bsdf_table.py
+	python3 tests/reference/make_bsdf_images.py
 
 bench-peers: build ## time against error beside Mitsuba 3 and Cycles, six scenes (a quarter of an hour)
 	python3 benches/peers/run.py

@@ -12,7 +12,7 @@ pub const TILE: usize = 8;
 /// The edge in pixels of the images that the references were made from.
 pub const RESOLUTION: usize = 256;
 
-/// One reference: a mean for every tile of a 256×256 rendering of the Cornell box.
+/// One reference: a mean for every tile of a rendering.
 #[derive(Clone, Debug)]
 pub struct Reference {
     /// Three estimates (R, G, B) a tile, row by row from the top.
@@ -35,7 +35,8 @@ impl Reference {
         [0, 1, 2].map(|channel| Estimate::mean_of_independent(self.tiles.iter().skip(channel).step_by(3).copied()))
     }
 
-    fn read(name: &str) -> Self {
+    /// A file of tests/reference/.
+    pub fn read(name: &str) -> Self {
         let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(name);
         let image = read()
             .no_deep_data()

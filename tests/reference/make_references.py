@@ -10,30 +10,18 @@ The script starts itself again inside a virtual environment with Mitsuba from Py
 """
 
 import argparse
-import os
 import sys
 import time
 import zlib
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
-from python_environment import InstallationFailed, choose_mitsuba_variant, mitsuba_environment  # noqa: E402
+from mitsuba_process import choose_mitsuba_variant, enter_environment
 
 RESOLUTION = 256
 TILE = 8
 NO_ROULETTE = 1 << 20
 # bounces -> (seeds, samples a pixel and seed). None is unlimited, ended by Mitsuba's unbiased roulette.
 PLAN = {0: (64, 256), 1: (64, 64), 2: (64, 64), 7: (64, 64), None: (64, 64)}
-
-
-def enter_environment() -> None:
-    """Replaces this process by one in a virtual environment that has Mitsuba, made on the first call."""
-    try:
-        python = mitsuba_environment()
-    except InstallationFailed as error:
-        sys.exit(f"error: {error}")
-    if Path(sys.prefix) != python.parent.parent:
-        os.execv(python, [str(python), os.path.abspath(__file__), *sys.argv[1:]])
 
 
 def integrator(mi, bounces):
@@ -103,7 +91,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, help="seeds for each image, instead of the plan's")
     parser.add_argument("--spp", type=int, help="samples a pixel and seed, instead of the plan's")
     arguments = parser.parse_args()
-    enter_environment()
+    enter_environment(__file__)
 
     import mitsuba as mi
     import numpy
