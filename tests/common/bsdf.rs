@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use sunfleck::layout::{BSDF_METALLIC_ROUGHNESS, MATERIAL_SCHLICK, MATERIAL_VOLUME};
+use sunfleck::scene::{Bsdf, Volume};
 
 use super::ggx_albedo::{self, Albedo};
 use super::kernel::{TestKernel, floats, texel, vector, vector_texel};
@@ -153,14 +154,13 @@ pub fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// shaders/test/bsdf.comp with a scene that has the albedo tables.
+/// shaders/test/bsdf.comp with a scene that has all albedo tables: of anisotropic metals and of a rough volume.
 pub fn bsdf_kernel() -> TestKernel {
-    TestKernel::with_scene("bsdf.comp", &scene("anisotropy"))
-}
-
-/// The same with a scene that has the albedo table of rough dielectrics too.
-pub fn dielectric_kernel() -> TestKernel {
-    TestKernel::with_scene("bsdf.comp", &scene("volumes"))
+    let mut scene = scene("anisotropy");
+    for material in scene.materials.iter_mut().filter(|m| m.bsdf == Bsdf::MetallicRoughness) {
+        material.volume = Some(Volume { attenuation_color: [1.0; 3], attenuation_distance: f32::INFINITY });
+    }
+    TestKernel::with_scene("bsdf.comp", &scene)
 }
 
 /// The metallic-roughness model of shaders/include/bsdf_metallic_roughness.glsl in f64, with the albedo of its table.
