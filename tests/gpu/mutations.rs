@@ -108,6 +108,24 @@ mutations! {
     flat_terminator: "include/shading_normal.glsl",
         "(0.5 * weights * max(depth * side, 0.0))" => "(0.0 * weights * max(depth * side, 0.0))",
         caught by "shading_normals::a_coarse_sphere_has_a_smooth_terminator";
+    /// The density of a refraction per half vector, not per direction.
+    dropped_refraction_jacobian: "include/bsdf_dielectric.glsl",
+        "visible_normal_pdf(p, wo, h) * sqr(p.eta) * jacobian" => "visible_normal_pdf(p, wo, h)",
+        caught by "bsdf_dielectric::scattered_directions_follow_the_pdf";
+    /// Rough glass refracts radiance as if it were power.
+    rough_eta_squared_left_out: "include/bsdf_dielectric.glsl",
+        "float value = refracted * lobe * near * jacobian;" =>
+        "float value = refracted * lobe * near * jacobian * sqr(p.eta);",
+        caught by "bsdf_dielectric::samples_agree_with_the_model";
+    /// Water in glass refracts as water in air.
+    boundary_to_nothing: "include/surface.glsl",
+        "medium_ior(constants, s.far) / medium_ior(constants, s.near)" =>
+        "(front ? medium_ior(constants, s.far) : 1.0 / medium_ior(constants, s.near))",
+        caught by "volume::boundaries_reflect_by_both_of_their_media";
+    /// Light samples are not absorbed.
+    clear_shadow_rays: "path_trace.comp",
+        "lane.shadow_light *= transmittance(constants, media, light.distance);" => "",
+        caught by "volume::shadow_rays_are_absorbed";
     /// A mirrored instance whose bitangent is not.
     unmirrored_bitangent: "include/attributes.glsl",
         "bitangent_sign = -bitangent_sign;" => "bitangent_sign = bitangent_sign;",

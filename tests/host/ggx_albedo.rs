@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
-use crate::common::ggx_albedo::{albedo, anisotropic_entry, entry, stored};
+use crate::common::ggx_albedo::{Albedo, albedo, anisotropic_entry, entry, stored};
 use crate::common::random::Random;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -76,11 +76,14 @@ fn the_anisotropic_table_holds_what_the_quadrature_gives() {
 }
 
 /// Between its nodes the table is never so low that a white metal would give back more than it gets by a thousandth, nor so
-/// high that it would lose a hundredth, at any ratio of the roughnesses, angle and azimuth.
+/// high that it would lose a hundredth, at any ratio of the roughnesses, angle and azimuth. The share of Schlick's term, which
+/// decides over the base under a dielectric, is not as well known where the roughnesses differ much: there it is too large.
 #[test]
 fn the_anisotropic_table_is_good_between_its_nodes() {
     let octaves = [1.0_f64, 1.5, 2.0, 4.0, 8.0, 16.0, 64.0, 4096.0];
-    for ratios in octaves.windows(2) {
+    // What dielectrics may lose.
+    let losses = [0.008, 0.008, 0.011, 0.013, 0.03, 0.1, 0.15];
+    for (ratios, loss) in octaves.windows(2).zip(losses) {
         let mut random = Random(ratios[1].to_bits());
         let mut draw = || random.unit();
         let points: Vec<_> = (0..1 << 11)
@@ -95,19 +98,28 @@ fn the_anisotropic_table_is_good_between_its_nodes() {
                 (alpha, cosine, azimuth)
             })
             .collect();
-        let errors: Vec<f64> = points
+        let errors: Vec<[f64; 2]> = points
             .into_par_iter()
             .map(|(alpha, cosine, azimuth)| {
                 let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
                 let wo = DVec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin());
-                // What comes back is the true albedo over the stored one.
-                let back = albedo(wo, alpha, 80).white / stored(wo, alpha).white - 1.0;
-                assert!((-1e-2..=1e-3).contains(&back), "alpha {alpha:?}, wo {wo}: 1 {back:+.2e} come back");
-                back
+                let (exact, stored) = (albedo(wo, alpha, 80), stored(wo, alpha));
+                // What comes back from a white metal is the true albedo over the stored one.
+                let metal = exact.white / stored.white - 1.0;
+                // A white dielectric's base gets what the stored albedo of its lobe leaves.
+                let f0 = 0.04;
+                let lobe = |a: Albedo| f0 * (a.white - a.schlick) + a.schlick;
+                let dielectric = (lobe(exact) - lobe(stored)) * (1.0 + f0 * (1.0 - stored.white) / stored.white);
+                assert!((-1e-2..=1e-3).contains(&metal), "alpha {alpha:?}, wo {wo}: 1 {metal:+.2e} come back");
+                [metal, dielectric]
             })
             .collect();
-        let limits = errors.iter().fold([0.0_f64; 2], |[low, high], e| [low.min(*e), high.max(*e)]);
-        println!("ratio {} to {}: 1 {:+.2e} to 1 {:+.2e} come back", ratios[0], ratios[1], limits[0], limits[1]);
+        for (k, what) in ["metal", "dielectric"].into_iter().enumerate() {
+            let limits = errors.iter().fold([0.0_f64; 2], |[low, high], e| [low.min(e[k]), high.max(e[k])]);
+            let [low, high] = ratios else { unreachable!("pairs") };
+            println!("ratio {low} to {high}, {what}: 1 {:+.2e} to 1 {:+.2e} come back", limits[0], limits[1]);
+            assert!(k == 0 || limits[0] > -loss && limits[1] < 1e-2, "ratio {low} to {high}: {limits:?}");
+        }
     }
 }
 

@@ -5,7 +5,8 @@ use glam::DVec3;
 use serde_json::{Value, json};
 use sunfleck::scene::load::{load_scene, resolve};
 use sunfleck::scene::{
-    AlphaMode, Bsdf, Environment, Filter, Fresnel, Primitive, Projection, PunctualKind, Scene, Texels, Wrap, builtin,
+    AlphaMode, Bsdf, Environment, Filter, Fresnel, Primitive, Projection, PunctualKind, Scene, Texels, Volume, Wrap,
+    builtin,
 };
 
 fn primitive(scene: &Scene) -> &Primitive {
@@ -262,6 +263,38 @@ fn materials_and_their_extensions() {
     assert!(scene.materials[2].fresnel == Fresnel::Schlick && scene.materials[2].black_back);
 }
 
+/// KHR_materials_volume makes a surface that transmits the boundary of a solid; without thickness it is a thin wall, and
+/// without transmission nothing is seen of it.
+#[test]
+fn volumes_of_surfaces_that_transmit() {
+    let material = |transmission: f64, volume: Value| json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": transmission}, "KHR_materials_volume": volume}});
+    let absorbing = json!({"thicknessFactor": 0.1, "attenuationColor": [0.5, 0, 1], "attenuationDistance": 2});
+    let materials = json!([
+        material(1.0, json!({"thicknessFactor": 1})),
+        material(0.5, absorbing.clone()),
+        material(1.0, json!({"attenuationDistance": 2})),
+        material(0.0, absorbing),
+        {"extras": {"sunfleck": {"bsdf": "glass"}}, "extensions": {"KHR_materials_volume": {"thicknessFactor": 1}}}
+    ]);
+    let primitives: Vec<Value> =
+        (0..5).map(|material| json!({"attributes": {"POSITION": 0}, "indices": 1, "material": material})).collect();
+    let scene = load_ok(&triangle_with(&[("/materials", materials), ("/meshes/0/primitives", json!(primitives))]));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let clear = Volume { attenuation_color: [1.0; 3], attenuation_distance: f32::INFINITY };
+    let tinted = Volume { attenuation_color: [0.5, 0.0, 1.0], attenuation_distance: 2.0 };
+    let volumes: Vec<Option<Volume>> = scene.materials.iter().map(|material| material.volume).collect();
+    assert_eq!(volumes, [Some(clear), Some(tinted), None, None, Some(clear)]);
+    scene.validate().expect("valid");
+    for (key, bad) in
+        [("attenuationDistance", json!(0)), ("attenuationColor", json!([2, 0, 0])), ("thicknessFactor", json!(-1))]
+    {
+        let mut volume = json!({"thicknessFactor": 1});
+        volume[key] = bad;
+        let error = load_error(&triangle_with(&[("/materials", json!([material(1.0, volume)]))])).to_string();
+        assert!(error.contains(key), "{error}");
+    }
+}
+
 #[test]
 fn a_primitive_without_a_material_has_the_default() {
     let mut document = triangle();
@@ -332,7 +365,7 @@ fn what_is_not_used_is_not_read() {
 fn each_missing_feature_is_one_warning() {
     let material = json!({"occlusionTexture": {"index": 0}, "alphaMode": "DITHER",
         "extensions": {"KHR_materials_clearcoat": {}, "KHR_materials_transmission": {"transmissionFactor": 1},
-                       "KHR_materials_volume": {}}});
+                       "KHR_materials_sheen": {}}});
     let part =
         |material: u32| json!({"attributes": {"POSITION": 0}, "indices": 1, "material": material, "targets": [{}]});
     let scene = load_ok(&triangle_with(&[
@@ -340,12 +373,12 @@ fn each_missing_feature_is_one_warning() {
         ("/meshes/0/primitives", json!([part(0), part(1)])),
         ("/nodes/0/skin", json!(0)),
         ("/animations", json!([{}])),
-        ("/extensionsUsed", json!(["KHR_materials_clearcoat", "KHR_materials_volume", "EXT_of_the_future"])),
+        ("/extensionsUsed", json!(["KHR_materials_clearcoat", "KHR_materials_sheen", "EXT_of_the_future"])),
     ]));
     let subjects = [
         "alphaMode DITHER",
         "KHR_materials_clearcoat",
-        "KHR_materials_volume",
+        "KHR_materials_sheen",
         "morph",
         "skins",
         "animations",
