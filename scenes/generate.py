@@ -466,13 +466,13 @@ def volumes():
     clear = glass("clear glass")
     amber = ((0.9, 0.45, 0.1), 0.4)
     row = [clear, glass("frosted glass", 0.45), glass("amber", attenuation=amber),
-           glass("frosted amber", 0.3, attenuation=amber), glass("half of it milky", 0.35, 1.6, (0.3, 0.6, 0.9), 0.5)]
+           glass("frosted amber", 0.4, attenuation=amber), glass("half of it milky", 0.35, 1.6, (0.3, 0.6, 0.9), 0.5)]
     for i, material in enumerate(row):
         scene.place(scene.doc["materials"][material]["name"], ball, material, translation=[1.15 * (i - 2), 0, 0])
     scene.place("glass of water", ball, clear, translation=[-1.2, 0, 1.3])
     scene.place("water", inner, glass("water", ior=1.33, attenuation=((0.5, 0.8, 0.9), 0.5)), translation=[-1.2, 0, 1.3])
     # What lies in a medium is lit through it.
-    scene.place("lamp glass", ball, glass("smoke", 0.2, 1.3, attenuation=((0.6, 0.55, 0.5), 0.5)), translation=[0, 0, 1.3])
+    scene.place("lamp glass", ball, glass("smoke", 0.55, 1.3, attenuation=((0.6, 0.55, 0.5), 0.5)), translation=[0, 0, 1.3])
     scene.place("bulb", bulb, scene.diffuse("bulb", (0, 0, 0), emission=(30, 26, 20)), translation=[0, 0.2, 1.3])
     scene.place("pearl", bulb, scene.diffuse("pearl", (0.9, 0.9, 0.9)), translation=[0.05, -0.2, 1.35])
     thin = scene.material("thin wall", (0.9, 1, 0.9), metallic=0, roughness=0.25, transmission=1)

@@ -3,6 +3,7 @@
 
 use crate::common::builder::{self, camera, placed, rectangle, scene};
 use crate::common::gpu;
+use crate::common::scenes::short_form;
 use crate::common::statistics::Estimate;
 use crate::common::trace::icosphere;
 use glam::DVec3;
@@ -119,14 +120,15 @@ fn boundaries_reflect_by_both_of_their_media() {
     let through = |m: &Material, way| transmittance(m.volume.unwrap(), way);
     let plain = seen_straight(slab(1.0, -1.0, 0), vec![glass.clone()], 4.0);
     let expected: [f64; 3] = std::array::from_fn(|k| layers(&[1.0, 1.8, 1.0], &[through(&glass, 2.0)[k]]).iter().sum());
-    assert_close("a slab", mean(&plain, 1 << 16), expected, 2e-3);
+    // A standard error of 4e-4 and less.
+    assert_close("a slab", mean(&plain, 1 << 14), expected, 4e-3);
     let filled =
         seen_straight([slab(1.0, -1.0, 0), slab(0.5, -0.5, 1)].concat(), vec![glass.clone(), water.clone()], 4.0);
     let expected: [f64; 3] = std::array::from_fn(|k| {
         let (wall, inside) = (through(&glass, 0.5)[k], through(&water, 1.0)[k]);
         layers(&[1.0, 1.8, 1.2, 1.8, 1.0], &[wall, inside, wall]).iter().sum()
     });
-    assert_close("with water", mean(&filled, 1 << 16), expected, 2e-3);
+    assert_close("with water", mean(&filled, 1 << 15), expected, 4e-3);
 }
 
 /// Light samples are absorbed too: a point light over a diffuse plate, all in one medium.
@@ -157,7 +159,8 @@ fn shadow_rays_are_absorbed() {
 /// A white furnace: rough glass of every kind gives back nearly what it gets, from outside and after many scatterings within.
 #[test]
 fn white_rough_glass_vanishes_before_a_white_environment() {
-    for (roughness, ior) in [(0.1, 1.5), (0.4, 1.5), (0.8, 1.3), (0.3, 2.4), (1.0, 1.5)] {
+    let all = [(1.0, 1.5), (0.4, 1.5), (0.8, 1.3), (0.3, 2.4), (0.1, 1.5)];
+    for (roughness, ior) in if short_form() { &all[..1] } else { &all[..] }.iter().copied() {
         let glass = Material { roughness, ..medium(ior, [1.0; 3], 1.0) };
         let ball = placed(icosphere(2), 1.0, DVec3::ZERO, 0);
         let camera = camera(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, 0.4);
