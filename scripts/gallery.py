@@ -32,7 +32,7 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("folder", type=Path, help="the folder of the models; paths in the list are relative to it")
     parser.add_argument("--only", help="names with commas; all without it")
-    parser.add_argument("--spp", type=int, default=32, help="samples per pixel [32]")
+    parser.add_argument("--spp", type=int, help="samples per pixel, in place of what the list says")
     parser.add_argument("--program", type=Path, default=REPOSITORY / "target" / "release" / "sunfleck")
     parser.add_argument("--out", type=Path, default=GALLERY, help="where the images and README.md go [docs/gallery]")
     parser.add_argument("--page", action="store_true", help="renders nothing, writes README.md from the list alone")
@@ -56,11 +56,11 @@ def save_jpeg(png: Path, jpeg: Path) -> None:
         image.convert("RGB").save(jpeg, quality=JPEG_QUALITY, optimize=True)
 
 
-def command(model: dict, scene: Path, png: Path, options, default_environment: str) -> list[str]:
+def command(model: dict, scene: Path, png: Path, options, table: dict) -> list[str]:
     width, height = LARGE_SIZE if model.get("large") else SIZE
     line = [str(options.program), "render", str(scene), "-o", str(png), "--resolution", f"{width}x{height}",
-            "--spp", str(model.get("spp", options.spp)), "--strict", "--json", "--quiet"]
-    lighting = model.get("environment", default_environment)
+            "--spp", str(options.spp or model.get("spp", table["spp"])), "--strict", "--json", "--quiet"]
+    lighting = model.get("environment", table["environment"])
     if lighting is not None:
         line += ["--env", str(options.folder / lighting)]
     if "yfov" in model:
@@ -75,7 +75,7 @@ def stage(model: dict, path: Path, scratch: Path, program: Path) -> Path:
     return staged_copy(path, scratch, program, model)
 
 
-def render(model: dict, options, default_environment: str) -> str | None:
+def render(model: dict, options, table: dict) -> str | None:
     """Renders one model to OUT/NAME.jpg; returns what went wrong, or None."""
     path = options.folder / model["file"]
     if not path.is_file():
@@ -86,7 +86,7 @@ def render(model: dict, options, default_environment: str) -> str | None:
             scene = stage(model, path, Path(scratch), options.program)
         except (OSError, ValueError, KeyError) as error:
             return f"{path}: {error!r}"
-        done = subprocess.run(command(model, scene, png, options, default_environment), capture_output=True, text=True)
+        done = subprocess.run(command(model, scene, png, options, table), capture_output=True, text=True)
         if model.get("refused"):
             return None if done.returncode == 3 else f"exit code {done.returncode}, where 3 (refused) is expected"
         if done.returncode != 0:
@@ -111,7 +111,7 @@ def main() -> int:
         enter_environment()
         for model in (model for model in table["models"] if model["name"] in names):
             begin = time.monotonic()
-            failure = render(model, options, table["environment"])
+            failure = render(model, options, table)
             outcome = failure or "; ".join(["done", *model.get("warnings", [])])
             print(f"{model['name']}: {outcome} ({time.monotonic() - begin:.0f} s)", file=sys.stderr)
             if failure:

@@ -21,8 +21,8 @@ VERDICTS = {"right": "right", "partly": "in part", "design": "by design", "wrong
 def row(model: dict) -> str:
     image = "refused" if model.get("refused") else f"![{model['name']}]({model['name'].replace(' ', '%20')}.jpg)"
     how = [f"turned {model['turn']}°"] if "turn" in model else ["facing the camera"] if "facing" in model else []
-    if "environment" in model:
-        how.append("its own light")
+    how += ["its own light"] if "environment" in model else []
+    how += [f"{model['spp']} samples"] if "spp" in model else []
     how += [f"`{' '.join(model['flags'])}`"] if model.get("flags") else []
     name = f"**{model['name']}**" + (f" ({', '.join(how)})" if how else "")
     return f"| {image} | {name}<br>*Should show:* {model['should']}<br>*Shows:* {model['shows']} | {VERDICTS[model['verdict']]} |"
@@ -37,7 +37,7 @@ def origin_row(model: dict, sources: dict) -> str:
 def write_page(table: dict, folder: Path) -> None:
     models = table["models"]
     counts = {verdict: sum(model["verdict"] == verdict for model in models) for verdict in VERDICTS}
-    lines = [HEAD.format(count=len(models), samples=64, **counts)]
+    lines = [HEAD.format(count=len(models), samples=table["spp"], **counts)]
     for group in dict.fromkeys(model["group"] for model in models):
         lines += [f"## {group}", "", "| image | model | verdict |", "|---|---|---|"]
         lines += [row(model) for model in models if model["group"] == group] + [""]
