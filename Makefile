@@ -47,7 +47,8 @@ bench-peers: build ## time against error beside Mitsuba 3 and Cycles, six scenes
 bench-peers-short: build ## the short form of it for CI: Mitsuba alone, one scene
 	python3 benches/peers/run.py --short
 
-gallery: build ## renders other people's models to docs/gallery (MODELS=FOLDER holds them; an hour on two cores)
+gallery: build ## renders other people's models to docs/gallery (MODELS=FOLDER; a quarter of an hour on two cores)
+	@test -n "$(MODELS)" || { echo "say where the models are: make gallery MODELS=FOLDER" >&2; exit 2; }
 	python3 scripts/gallery.py "$(MODELS)"
 
 clean: ## removes what was built and rendered

@@ -2,8 +2,8 @@
 """Renders the gallery of other people's models (`make gallery MODELS=FOLDER`; docs/gallery/README.md).
 
 FOLDER holds the models, which are no part of the repository; docs/gallery/models.json lists them, each with what its
-author says it shows and what Sunfleck's image shows. A model that is missing or fails is named, the rest is rendered, and the exit
-code is 1. A model that is `refused` in the list must be refused.
+author says it shows and what Sunfleck's image shows. A model that is missing or fails is named, the rest is rendered,
+and the exit code is 1. A model that is `refused` in the list must be refused.
 """
 
 import argparse
@@ -105,6 +105,8 @@ def main() -> int:
         sys.exit(f"gallery: {', '.join(sorted(unknown))}: not in {GALLERY / 'models.json'}")
     if not options.folder.is_dir():
         sys.exit(f"gallery: {options.folder} is no folder")
+    if not options.program.is_file():
+        sys.exit(f"gallery: {options.program} is missing; run `make build`, or give --program")
     options.out.mkdir(parents=True, exist_ok=True)
     failures = []
     if not options.page:

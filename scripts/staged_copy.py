@@ -1,6 +1,7 @@
-"""A copy of a scene file whose content is turned before the camera that Sunfleck adds, or seen by one of a narrower field of view.
+"""A copy of a scene file, turned before the camera that Sunfleck adds, or with a camera of a narrower field of view.
 
-The camera in the copy stands where Sunfleck's own would. Textures and buffers are linked beside the copy; lights turn with the scene.
+The camera in the copy stands where Sunfleck's own would. Textures and buffers are linked beside the copy; lights turn
+with the scene.
 """
 
 import json
