@@ -6,7 +6,6 @@
 // Where the surface is the boundary of a volume, the share (1 − metallic)·transmission of it is bsdf_dielectric.glsl's
 // instead, and the rest is this without transmission.
 //
-//
 // E₁(wo) is the albedo of D·V alone: what one scattering keeps. The factor 1 + F0·(1 − E₁)/E₁, for the dielectric and the
 // metal each, gives back what it loses (Turquin 2019, "Practical multiple scattering compensation for microfacet models",
 // eq. 16), and the base gets what the dielectric's

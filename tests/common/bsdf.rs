@@ -154,6 +154,21 @@ pub fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
+/// GGX for roughness along x and z.
+pub fn ggx_distribution(h: DVec3, [x, z]: [f64; 2]) -> f64 {
+    1.0 / (PI * x * z * ((h.x / x).powi(2) + (h.z / z).powi(2) + h.y * h.y).powi(2))
+}
+
+/// Smith's Λ of GGX.
+pub fn smith_lambda(w: DVec3, [x, z]: [f64; 2]) -> f64 {
+    0.5 * ((1.0 + ((x * w.x).powi(2) + (z * w.z).powi(2)) / (w.y * w.y)).sqrt() - 1.0)
+}
+
+/// `bsdf_kernel` for `evaluate`.
+pub fn evaluating_kernel() -> TestKernel {
+    bsdf_kernel().define("EVALUATE", 1)
+}
+
 /// shaders/test/bsdf.comp with a scene that has all albedo tables: of anisotropic metals and of a rough volume.
 pub fn bsdf_kernel() -> TestKernel {
     let mut scene = scene("anisotropy");
@@ -239,14 +254,11 @@ impl MetallicRoughness {
     }
 
     fn distribution(&self, h: DVec3) -> f64 {
-        let [x, z] = self.alpha;
-        1.0 / (PI * x * z * ((h.x / x).powi(2) + (h.z / z).powi(2) + h.y * h.y).powi(2))
+        ggx_distribution(h, self.alpha)
     }
 
-    /// Smith's Λ.
     fn lambda(&self, w: DVec3) -> f64 {
-        let [x, z] = self.alpha;
-        0.5 * ((1.0 + ((x * w.x).powi(2) + (z * w.z).powi(2)) / (w.y * w.y)).sqrt() - 1.0)
+        smith_lambda(w, self.alpha)
     }
 
     /// Density of reflections by bounded visible normals (Eto and Tokuyoshi 2023, eq. 8).

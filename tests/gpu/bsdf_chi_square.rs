@@ -2,8 +2,8 @@
 //! parameters, with bins narrow enough for the narrowest lobe. Delta lobes and absorption are cells of their own.
 
 use crate::common::bsdf::{
-    Configuration, MetallicRoughness, SCATTERED_THROUGH, Sample, Value, bsdf_kernel, direction, evaluate, luminance,
-    scatter,
+    Configuration, MetallicRoughness, SCATTERED_THROUGH, Sample, Value, bsdf_kernel, direction, evaluate,
+    evaluating_kernel, luminance, scatter,
 };
 use crate::common::half_vector_bins::{HalfVectorBins, Node};
 use crate::common::kernel::TestKernel;
@@ -178,18 +178,10 @@ fn failures(configurations: &[Configuration], results: &[ChiSquare]) -> Vec<Stri
     failed.map(|(c, result)| format!("{c:?}: {result:?}")).collect()
 }
 
-fn scattering() -> TestKernel {
-    bsdf_kernel()
-}
-
-fn evaluating() -> TestKernel {
-    bsdf_kernel().define("EVALUATE", 1)
-}
-
 #[test]
 fn scattered_directions_follow_the_pdf() {
     let configurations = configurations();
-    let failures = failures(&configurations, &chi_square(&scattering(), &evaluating(), &configurations));
+    let failures = failures(&configurations, &chi_square(&bsdf_kernel(), &evaluating_kernel(), &configurations));
     assert!(failures.is_empty(), "{} fail:\n{}", failures.len(), failures.join("\n"));
 }
 
@@ -199,8 +191,8 @@ fn a_wrong_roughness_is_noticed() {
     let wo = direction(0.6, 1.0);
     let metal = |roughness| Configuration::metallic_roughness(roughness, 1.0, 1.5, 0.0, wo);
     let configurations: Vec<Configuration> = ROUGHNESS[2..].iter().map(|r| metal(*r)).collect();
-    let faulty = scattering().define("ALPHA_FAULT", 1.1);
-    let results = chi_square(&faulty, &evaluating(), &configurations);
+    let faulty = bsdf_kernel().define("ALPHA_FAULT", 1.1);
+    let results = chi_square(&faulty, &evaluating_kernel(), &configurations);
     assert_eq!(failures(&configurations, &results).len(), configurations.len(), "{results:?}");
 }
 
@@ -208,8 +200,8 @@ fn a_wrong_roughness_is_noticed() {
 #[test]
 fn a_wrong_normalisation_is_noticed() {
     let configurations = [Configuration::new(BSDF_LAMBERTIAN, [1.0; 3], direction(0.6, 1.0))];
-    let faulty = evaluating().define("PDF_FAULT", 0.97);
-    let results = chi_square(&scattering(), &faulty, &configurations);
+    let faulty = evaluating_kernel().define("PDF_FAULT", 0.97);
+    let results = chi_square(&bsdf_kernel(), &faulty, &configurations);
     assert_eq!(failures(&configurations, &results).len(), 1, "{results:?}");
 }
 
@@ -236,7 +228,7 @@ fn the_quadrature_has_converged() {
 #[test]
 fn densities_integrate_to_their_share() {
     let configurations = configurations();
-    for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
+    for (c, integrals) in configurations.iter().zip(integrate(&evaluating_kernel(), &configurations)) {
         let continuous: f64 = integrals.pdf.iter().sum();
         let all = continuous + delta_probabilities(c).iter().sum::<f64>();
         assert!(all < 1.0 + 1e-3, "{c:?}: {all}");
@@ -266,7 +258,7 @@ fn white_lobes_give_back_what_they_get() {
         }
     }
     let mut worst = [0.0_f64; 2];
-    for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
+    for (c, integrals) in configurations.iter().zip(integrate(&evaluating_kernel(), &configurations)) {
         // The error of f32 directions where the lobe is narrow; that of the quadrature is below 1e-4.
         let slack = c.rounding(c.wo);
         let albedo = luminance(integrals.albedo) - 1.0;
@@ -276,7 +268,7 @@ fn white_lobes_give_back_what_they_get() {
     println!("albedo of white: 1 {:+.2e} to 1 {:+.2e}", worst[0], worst[1]);
     let lambertian =
         [0.9, 1e-3].map(|cosine| Configuration::new(BSDF_LAMBERTIAN, [0.8, 0.5, 0.2], direction(cosine, 2.0)));
-    for integrals in integrate(&evaluating(), &lambertian) {
+    for integrals in integrate(&evaluating_kernel(), &lambertian) {
         assert!((integrals.albedo - DVec3::new(0.8, 0.5, 0.2)).abs().max_element() < 1e-4, "{}", integrals.albedo);
     }
 }
@@ -286,7 +278,7 @@ fn white_lobes_give_back_what_they_get() {
 fn a_single_scattering_loses_light() {
     let wo = DVec3::Y;
     let c = Configuration { color: [1.0; 3], ..Configuration::metallic_roughness(1.0, 1.0, 1.5, 0.0, wo) };
-    let albedo = luminance(integrate(&evaluating(), &[c])[0].albedo);
+    let albedo = luminance(integrate(&evaluating_kernel(), &[c])[0].albedo);
     let single = albedo / luminance(MetallicRoughness::new(&c, wo).multiple_scattering(DVec3::ONE));
     assert!((single - (1.0 - 2.0_f64.ln())).abs() < 1e-3, "{single}");
 }
@@ -319,7 +311,7 @@ fn anisotropic_lobes_give_back_what_they_get() {
         }
     }
     let mut worst = [0.0_f64; 2];
-    for (c, integrals) in configurations.iter().zip(integrate(&evaluating(), &configurations)) {
+    for (c, integrals) in configurations.iter().zip(integrate(&evaluating_kernel(), &configurations)) {
         let slack = c.rounding(c.wo);
         let albedo = luminance(integrals.albedo) - 1.0;
         worst = [worst[0].min(albedo + slack), worst[1].max(albedo - slack)];
@@ -334,9 +326,9 @@ fn anisotropic_lobes_give_back_what_they_get() {
 fn samples_agree_with_evaluation() {
     const EACH: usize = 512;
     let configurations = configurations();
-    let samples = scatter(&scattering(), &configurations, EACH, 2);
+    let samples = scatter(&bsdf_kernel(), &configurations, EACH, 2);
     let at: Vec<(usize, DVec3)> = samples.iter().enumerate().map(|(i, s)| (i / EACH, s.wi)).collect();
-    let values = evaluate(&evaluating(), &configurations, &at);
+    let values = evaluate(&evaluating_kernel(), &configurations, &at);
     for ((sample, value), (index, _)) in samples.iter().zip(&values).zip(&at) {
         if sample.is_delta() || sample.is_absorbed() {
             assert!(sample.pdf == 0.0, "{sample:?}");
@@ -386,7 +378,7 @@ fn everything_is_finite_at_grazing_angles() {
             }
         }
     }
-    let samples = scatter(&scattering(), &configurations, SAMPLES, 3);
+    let samples = scatter(&bsdf_kernel(), &configurations, SAMPLES, 3);
     for (i, sample) in samples.iter().enumerate() {
         let c = &configurations[i / SAMPLES];
         assert!(sample.weight.is_finite() && sample.pdf.is_finite() && sample.wi.is_finite(), "{c:?}: {sample:?}");

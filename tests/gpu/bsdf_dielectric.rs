@@ -1,12 +1,12 @@
 //! The rough boundary of a volume (shaders/include/bsdf_dielectric.glsl): χ² of sampling against density, the furnace,
-//! values against the model in f64, and reciprocity. Reflections and refractions are told by the visible normal that leads
+//! and values against the model in f64. Reflections and refractions are told by the visible normal that leads
 //! to them, in the coordinates in which visible normals are uniform: there every lobe is as broad as the square.
 
 use std::f64::consts::PI;
 
 use crate::common::bsdf::{
-    Configuration, SCATTERED_DELTA, SCATTERED_THROUGH, Sample, Value, bsdf_kernel, direction, evaluate, luminance,
-    scatter,
+    Configuration, SCATTERED_DELTA, SCATTERED_THROUGH, Sample, Value, bsdf_kernel, direction, evaluate,
+    evaluating_kernel, ggx_distribution, luminance, scatter, smith_lambda,
 };
 use crate::common::dielectric_albedo::{Table, fresnel, refracted_cosine};
 use crate::common::kernel::TestKernel;
@@ -84,19 +84,13 @@ impl VisibleNormals {
         [u, (cap.z.atan2(cap.x) / (2.0 * PI)).rem_euclid(1.0)]
     }
 
-    fn distribution(&self, h: DVec3) -> f64 {
-        let [x, z] = self.alpha;
-        1.0 / (PI * x * z * ((h.x / x).powi(2) + (h.z / z).powi(2) + h.y * h.y).powi(2))
-    }
-
     fn lambda(&self, w: DVec3) -> f64 {
-        let [x, z] = self.alpha;
-        0.5 * ((1.0 + ((x * w.x).powi(2) + (z * w.z).powi(2)) / (w.y * w.y)).sqrt() - 1.0)
+        smith_lambda(w, self.alpha)
     }
 
     /// Density of visible normals, per solid angle of h.
     fn density(&self, h: DVec3) -> f64 {
-        self.distribution(h) * self.wo.dot(h) / (self.wo.y * (1.0 + self.lambda(self.wo)))
+        ggx_distribution(h, self.alpha) * self.wo.dot(h) / (self.wo.y * (1.0 + self.lambda(self.wo)))
     }
 }
 
@@ -229,14 +223,6 @@ fn pool_small(observed: &mut [u64], expected: &mut [f64]) -> Result<(), String> 
     if close { Ok(()) } else { Err(format!("{found} samples where {awaited:.1} are expected")) }
 }
 
-fn scattering() -> TestKernel {
-    bsdf_kernel()
-}
-
-fn evaluating() -> TestKernel {
-    bsdf_kernel().define("EVALUATE", 1)
-}
-
 /// Boundaries alone and as a part of a material whose other lobes are broad.
 #[test]
 fn scattered_directions_follow_the_pdf() {
@@ -245,14 +231,14 @@ fn scattered_directions_follow_the_pdf() {
         let (transmission, metallic) = [(0.5, 0.0), (1.0, 0.4), (0.3, 0.3)][i / 3 % 3];
         configurations.push(Configuration { transmission, metallic, specular: [1.0, 0.3][i % 2], ..c });
     }
-    let failures = failures(&scattering(), &evaluating(), &configurations);
+    let failures = failures(&bsdf_kernel(), &evaluating_kernel(), &configurations);
     assert!(failures.is_empty(), "{} of {} fail:\n{}", failures.len(), configurations.len(), failures.join("\n"));
 }
 
 #[test]
 fn a_wrong_roughness_is_noticed() {
     let configurations: Vec<_> = boundaries().into_iter().filter(|c| c.wo.y == 1.0 && c.eta == 1.5).collect();
-    let failures = failures(&scattering().define("ALPHA_FAULT", 1.1), &evaluating(), &configurations);
+    let failures = failures(&bsdf_kernel().define("ALPHA_FAULT", 1.1), &evaluating_kernel(), &configurations);
     assert_eq!(failures.len(), configurations.len());
 }
 
@@ -262,7 +248,7 @@ fn white_boundaries_give_back_what_they_get() {
     let mut configurations = boundaries();
     configurations.extend(boundaries().into_iter().step_by(5).map(|c| Configuration { specular: 0.4, ..c }));
     let mut worst = [(0.0, 0); 2];
-    let integrals = integrate(&evaluating(), &configurations);
+    let integrals = integrate(&evaluating_kernel(), &configurations);
     for (i, (_, flux)) in integrals.iter().enumerate() {
         let slack = rounding(&configurations[i], 1.0) + 1e-3;
         let excess = flux - 1.0;
@@ -279,13 +265,13 @@ fn white_boundaries_give_back_what_they_get() {
 }
 
 /// At scattered directions, the shader's values are the model's in f64, the sample's weight and density are those of
-/// evaluation, and radiance over η² is the same both ways but for the light of several scatterings.
+/// evaluation.
 #[test]
 fn samples_agree_with_the_model() {
     const EACH: usize = 256;
     let configurations = boundaries();
-    let samples = scatter(&scattering(), &configurations, EACH, 6);
-    let kernel = evaluating();
+    let samples = scatter(&bsdf_kernel(), &configurations, EACH, 6);
+    let kernel = evaluating_kernel();
     let at: Vec<(usize, DVec3)> = samples.iter().enumerate().map(|(i, s)| (i / EACH, s.wi)).collect();
     let values = evaluate(&kernel, &configurations, &at);
     let (mut compared, mut reflected) = (0, 0);
@@ -328,7 +314,7 @@ fn smooth_boundaries_follow_fresnel_and_snell() {
     for c in &mut configurations {
         c.alpha = if c.alpha < 2.0_f32.powi(-12) { 0.0 } else { c.alpha };
     }
-    let samples = scatter(&scattering(), &configurations, SAMPLES, 7);
+    let samples = scatter(&bsdf_kernel(), &configurations, SAMPLES, 7);
     for (c, samples) in configurations.iter().zip(samples.chunks_exact(SAMPLES)) {
         let eta = f64::from(c.eta);
         let transmitted = refracted_cosine(c.wo.y, eta);

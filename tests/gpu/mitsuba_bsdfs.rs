@@ -6,7 +6,7 @@
 //! - the Fresnel term of dielectric lobes: Schlick's here, the exact one there;
 //! - visible normals: the bounded ones here, all there.
 
-use crate::common::bsdf::{Configuration, MetallicRoughness, Value, bsdf_kernel, evaluate};
+use crate::common::bsdf::{Configuration, MetallicRoughness, Value, evaluate, evaluating_kernel, smith_lambda};
 use crate::common::dielectric_albedo::Table;
 use crate::common::gpu;
 use crate::common::kernel::{floats, texel};
@@ -39,11 +39,6 @@ fn new(case: &Case<Continuous>, wo: DVec3) -> Configuration {
     Configuration::new(BSDF_METALLIC_ROUGHNESS, case.color, wo)
 }
 
-/// Smith's Λ of GGX.
-fn lambda(w: DVec3, [x, z]: [f64; 2]) -> f64 {
-    0.5 * ((1.0 + ((x * w.x).powi(2) + (z * w.z).powi(2)) / (w.y * w.y)).sqrt() - 1.0)
-}
-
 /// Unpolarised dielectric reflectance (Born and Wolf, §1.5.2).
 fn fresnel(cosine: f64, eta: f64) -> f64 {
     let transmitted = (1.0 - (1.0 - cosine * cosine) / (eta * eta)).sqrt();
@@ -70,7 +65,7 @@ fn factors(c: &Configuration, plugin: &str, row: &Continuous) -> Factors {
     }
     let alpha = c.alphas().map(f64::from);
     let up = DVec3::new(row.wi.x, row.wi.y.abs(), row.wi.z);
-    let (o, i) = (lambda(row.wo, alpha), lambda(up, alpha));
+    let (o, i) = (smith_lambda(row.wo, alpha), smith_lambda(up, alpha));
     let smith = (1.0 + o + i) / ((1.0 + o) * (1.0 + i));
     let model = MetallicRoughness::new(c, row.wo);
     let cosine = row.wo.dot((row.wo + up).normalize());
@@ -137,7 +132,7 @@ fn shader_values(cases: &[Case<Continuous>], wrong: f32) -> Vec<Value> {
         .map(|c| Configuration { alpha: c.alpha * wrong, ..c })
         .collect();
     let at: Vec<(usize, DVec3)> = rows().enumerate().map(|(index, (_, row))| (index, row.wi)).collect();
-    evaluate(&bsdf_kernel().define("EVALUATE", 1), &configurations, &at)
+    evaluate(&evaluating_kernel(), &configurations, &at)
 }
 
 /// How much the rounding of the half vector changes a value, relatively. That of a refraction is shorter than two directions'
