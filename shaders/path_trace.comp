@@ -42,6 +42,7 @@ void start_sample(inout LaneState lane) {
     if (HAS_VOLUME) lane.media = OUTSIDE;
     vec4 u = to_unit(sample_bits(sample_key(lane), 0u, DIMENSIONS_FILM));
     CameraRay camera = camera_ray(constants, uvec2(lane.pixel & 0xffffu, lane.pixel >> 16u), u);
+    if (HAS_MIP) lane.cone = camera_cone(constants, camera.direction);
     lane.ray = Ray(camera.origin, camera.direction, INFINITY, false, NO_TRIANGLE, NO_TRIANGLE);
 }
 
@@ -137,6 +138,13 @@ bool survives_roulette(inout LaneState lane, float u) {
     return true;
 }
 
+RayCone scattered_cone(RayCone cone, Surface surface, BsdfSample scattered, vec3 wo) {
+    if ((scattered.flags & SCATTERED_DELTA) == 0u) return lobe_cone(scattered.pdf);
+    bool through = (scattered.flags & SCATTERED_THROUGH) != 0u;
+    float cos_t = abs(dot(scattered.wi, surface.frame.normal));
+    return delta_cone(cone, surface.curved, through, surface.bsdf.eta, abs(wo.y), cos_t);
+}
+
 // Draws the next direction and stores its ray; false if the path ends here.
 bool scatter(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle) {
     vec4 u = to_unit(sample_bits(sample_key(lane), lane.bounce, DIMENSIONS_SCATTER));
@@ -150,6 +158,7 @@ bool scatter(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle
     if (max_component(lane.throughput) == 0.0 || !survives_roulette(lane, u.w)) return false;
     lane.emission_weight = scattered_emission_weight(lane, scattered);
     lane.pdf = scattered.pdf;
+    if (HAS_MIP) lane.cone = scattered_cone(lane.cone, surface, scattered, wo);
     lane.next_origin = scattered_origin(surface, through);
     lane.next_direction = safe_normalize(scattered.wi);
     lane.next_from = scattered_from(surface, triangle, scattered.wi, through);
@@ -178,7 +187,8 @@ bool shade(inout LaneState lane, Hit hit) {
         return false;
     }
     vec3 view = -lane.ray.direction;
-    Surface surface = surface_at(constants, hit, view, lane.media);
+    if (HAS_MIP) lane.cone.width = cone_width(lane.cone, hit.t);
+    Surface surface = surface_at(constants, hit, view, lane.media, lane.cone.width);
     if (HAS_VOLUME) {
         lane.media = surface.near;
         lane.throughput *= transmittance(constants, lane.media, hit.t);

@@ -252,6 +252,8 @@ pub const TEXTURE_WRAP_U_SHIFT: u32 = 4;
 pub const TEXTURE_WRAP_V_SHIFT: u32 = 6;
 /// `sampling`: the transform is not the identity.
 pub const TEXTURE_TRANSFORMED: u32 = 1 << 8;
+/// `sampling`: lookups by a ray cone use the mip chain.
+pub const TEXTURE_MIPS: u32 = 1 << 9;
 
 /// Where a texture's texels are, by which coordinates and how they are read.
 #[repr(C)]
@@ -267,12 +269,13 @@ pub struct TextureHeader {
     pub sampling: u32,
     /// u′ of the lookup is the dot product with (u, v, 1).
     pub u_row: [f32; 3],
-    /// Unused, zero.
-    pub unused: u32,
+    /// With [`TEXTURE_MIPS`]: word in [`SceneArray::Texels`] of the list of the first words of the levels 1, 2, … to the
+    /// one of a single texel. Level l has max(1, ⌊size/2ˡ⌋) texels along each side, of 16 bits a channel, linear.
+    pub mips: u32,
     /// v′ of the lookup is the dot product with (u, v, 1).
     pub v_row: [f32; 3],
     /// Unused, zero.
-    pub unused_too: u32,
+    pub unused: u32,
 }
 
 /// Texels a texture header takes.
@@ -460,4 +463,4 @@ pub struct BlockResult {
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
-pub const LANE_STATE_BYTES: usize = 224;
+pub const LANE_STATE_BYTES: usize = 240;

@@ -12,13 +12,16 @@ struct Vertices {
     vec3 normal;     // interpolated unit shading normal in world space, on the front; zero if the triangle is flat
     mat3 corners;    // the vertices' normals, in the space of the mesh
     vec4 texcoords;  // interpolated, set 0 and set 1; zero where there are none
+    vec4 along_ab;   // their difference between the first vertex and the second
+    vec4 along_ac;   // and the third
+    mat4x3 footprint;  // of lookups in mip chains, see texture.glsl; none until somebody sets it
     vec4 tangent;    // interpolated, in world space, and the bitangent's sign; zero if there is none
     vec4 color;      // interpolated; 1 where there are none
 };
 
 // The point with the given weights of the second and third vertex.
 Vertices interpolate_vertices(RenderConstants constants, uint triangle, uint instance, vec2 barycentric) {
-    Vertices result = Vertices(vec3(0.0), mat3(0.0), vec4(0.0), vec4(0.0), vec4(1.0));
+    Vertices result = Vertices(vec3(0.0), mat3(0.0), vec4(0.0), vec4(0.0), vec4(0.0), NO_FOOTPRINT, vec4(0.0), vec4(1.0));
     if (!HAS_NORMALS && !HAS_TEXTURES && !HAS_TANGENTS && !HAS_VERTEX_COLORS) return result;
     uvec4 record = LOAD4(ATTRIBUTES, triangle);
     if (record.w == 0u) return result;
@@ -39,10 +42,14 @@ Vertices interpolate_vertices(RenderConstants constants, uint triangle, uint ins
         }
     }
     if (HAS_TEXTURES && (record.w & TRIANGLE_TEXCOORDS) != 0u) {
-        vec3 rest = uintBitsToFloat(LOAD4(ATTRIBUTES, first.x + 1u).xyz) * weights.x +
-                    uintBitsToFloat(LOAD4(ATTRIBUTES, first.y + 1u).xyz) * weights.y +
-                    uintBitsToFloat(LOAD4(ATTRIBUTES, first.z + 1u).xyz) * weights.z;
-        result.texcoords = vec4(mixed.w, rest);
+        vec4 at_a = vec4(a.w, uintBitsToFloat(LOAD4(ATTRIBUTES, first.x + 1u).xyz));
+        vec4 at_b = vec4(b.w, uintBitsToFloat(LOAD4(ATTRIBUTES, first.y + 1u).xyz));
+        vec4 at_c = vec4(c.w, uintBitsToFloat(LOAD4(ATTRIBUTES, first.z + 1u).xyz));
+        result.texcoords = at_a * weights.x + at_b * weights.y + at_c * weights.z;
+        if (HAS_MIP) {
+            result.along_ab = at_b - at_a;
+            result.along_ac = at_c - at_a;
+        }
     }
     if (HAS_TANGENTS && (record.w & TRIANGLE_TANGENTS) != 0u) {
         vec4 ta = uintBitsToFloat(LOAD4(ATTRIBUTES, first.x + 2u));
@@ -70,7 +77,7 @@ vec4 base_color(RenderConstants constants, Material material, Vertices vertices)
     vec4 color = vec4(material.base_color, material.alpha);
     if (HAS_VERTEX_COLORS) color *= vertices.color;
     if (HAS_TEXTURES && material.base_color_texture != NONE)
-        color *= sample_texture(constants, material.base_color_texture, vertices.texcoords);
+        color *= sample_texture(constants, material.base_color_texture, vertices.texcoords, vertices.footprint);
     return color;
 }
 

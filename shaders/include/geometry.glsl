@@ -29,6 +29,8 @@ struct SurfacePoint {
     vec3 error;             // bound on the absolute error of each coordinate
     vec3 geometric_normal;  // unit, on the front
     float area;             // of the triangle, in world space
+    vec3 ab;                // its edges from the first vertex, in world space
+    vec3 ac;
 };
 
 // The point with the given weights of the second and third vertex. Errors as in pbrt-v4 (PBR, 4th ed., §6.8.4).
@@ -60,6 +62,8 @@ SurfacePoint surface_point(RenderConstants constants, TriangleVertices vertices,
     vec3 scaled = normal / scale;
     float length_scaled = sqrt(dot(scaled, scaled));
     point.area = 0.5 * scale * length_scaled;
+    point.ab = ab;
+    point.ac = ac;
     point.geometric_normal = scaled / length_scaled;
     if (HAS_INSTANCES && instance != NONE && load_instance_header(constants, instance).z != 0u)
         point.geometric_normal = -point.geometric_normal;

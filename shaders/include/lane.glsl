@@ -2,6 +2,7 @@
 #ifndef LANE_GLSL
 #define LANE_GLSL
 #include "media.glsl"
+#include "ray_cone.glsl"
 
 // How emission found by the path's ray counts.
 const uint WEIGHT_FULL = 0u;    // all of it: seen by the camera, after a delta lobe, or light sampling is off
@@ -31,6 +32,7 @@ struct LaneState {
     float luminance_squared;
     vec3 compensation;
     uint samples;
+    RayCone cone;          // of the path's ray, or after the shadow ray of the scattered one
     Media media;           // that the path's ray, or after the shadow ray the scattered one, is in
 };
 
@@ -72,6 +74,7 @@ LaneState new_lane(RenderConstants constants, SliceConstants slice, uint index) 
     lane.luminance_squared = 0.0;
     lane.compensation = vec3(0.0);
     lane.samples = 0u;
+    lane.cone = RayCone(0.0, 0.0);
     lane.media = OUTSIDE;
     return lane;
 }

@@ -43,6 +43,7 @@ const uint TEXTURE_SET_1 = 8u;
 const uint TEXTURE_WRAP_U_SHIFT = 4u;
 const uint TEXTURE_WRAP_V_SHIFT = 6u;
 const uint TEXTURE_TRANSFORMED = 0x100u;
+const uint TEXTURE_MIPS = 0x200u;
 const uint TEXTURE_TEXELS = 3u;
 
 const uint LIGHT_TRIANGLE = 0u;
@@ -155,6 +156,7 @@ struct TextureHeader {
     uint height;
     uint sampling;
     vec3 u_row;
+    uint mips;
     vec3 v_row;
 };
 

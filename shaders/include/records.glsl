@@ -47,7 +47,8 @@ Material load_material(RenderConstants constants, uint index) {
 TextureHeader load_texture_header(RenderConstants constants, uint index) {
     uint base = constants.textures + index * TEXTURE_TEXELS;
     uvec4 a = LOAD4(TABLES, base);
-    TextureHeader header = TextureHeader(a.x, a.y, a.z, a.w, vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0));
+    TextureHeader header = TextureHeader(a.x, a.y, a.z, a.w, vec3(1.0, 0.0, 0.0), NONE, vec3(0.0, 1.0, 0.0));
+    if (HAS_MIP && (header.sampling & TEXTURE_MIPS) != 0u) header.mips = LOAD4(TABLES, base + 1u).w;
     if ((header.sampling & TEXTURE_TRANSFORMED) != 0u) {
         header.u_row = uintBitsToFloat(LOAD4(TABLES, base + 1u).xyz);
         header.v_row = uintBitsToFloat(LOAD4(TABLES, base + 2u).xyz);

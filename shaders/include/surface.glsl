@@ -20,17 +20,19 @@ struct Surface {
     Media near;         // on the side of wo
     Media far;          // on the other side
     bool black;         // scatters nothing
+    bool curved;        // its normal changes from point to point
 };
 
 BsdfParameters bsdf_parameters(RenderConstants constants, Material material, Vertices vertices, bool front) {
     vec4 uv = vertices.texcoords;
+    mat4x3 footprint = vertices.footprint;
     BsdfParameters p;
     p.kind = material.kind_flags & MATERIAL_KIND_MASK;
     p.color = base_color(constants, material, vertices).rgb;
     p.metallic = material.metallic;
     float roughness = material.roughness;
     if (HAS_TEXTURES && material.metallic_roughness_texture != NONE) {
-        vec4 texel = sample_texture(constants, material.metallic_roughness_texture, uv);
+        vec4 texel = sample_texture(constants, material.metallic_roughness_texture, uv, footprint);
         roughness *= texel.g;
         p.metallic *= texel.b;
     }
@@ -43,11 +45,11 @@ BsdfParameters bsdf_parameters(RenderConstants constants, Material material, Ver
     p.specular = material.specular;
     p.specular_color = material.specular_color;
     if (HAS_SPECULAR && HAS_TEXTURES && material.specular_texture != NONE)
-        p.specular *= sample_texture(constants, material.specular_texture, uv).a;
+        p.specular *= sample_texture(constants, material.specular_texture, uv, footprint).a;
     if (HAS_SPECULAR && HAS_TEXTURES && material.specular_color_texture != NONE)
-        p.specular_color *= sample_texture(constants, material.specular_color_texture, uv).rgb;
+        p.specular_color *= sample_texture(constants, material.specular_color_texture, uv, footprint).rgb;
     if (HAS_TRANSMISSION && HAS_TEXTURES && material.transmission_texture != NONE)
-        p.transmission *= sample_texture(constants, material.transmission_texture, uv).r;
+        p.transmission *= sample_texture(constants, material.transmission_texture, uv, footprint).r;
     p.schlick = (material.kind_flags & MATERIAL_SCHLICK) != 0u;
     return p;
 }
@@ -65,14 +67,32 @@ void set_media(RenderConstants constants, inout Surface s, uint material, bool f
     if (s.bsdf.kind == BSDF_METALLIC_ROUGHNESS) s.bsdf.ior = s.bsdf.eta;
 }
 
-// `media` are those that the ray to the hit began in.
-Surface surface_at(RenderConstants constants, Hit hit, vec3 wo, Media media) {
+// The gradients of the texture coordinates times `width`, all turned by 90° in the triangle's plane: (∇u × n)·2·area =
+// ac·Δu_ab − ab·Δu_ac.
+mat4x3 texture_footprint(SurfacePoint point, Vertices vertices, float width) {
+    float scale = 0.5 * width / point.area;
+    vec3 ab = point.ab * scale;
+    vec3 ac = point.ac * scale;
+    vec4 d = vertices.along_ab;
+    vec4 e = vertices.along_ac;
+    return mat4x3(ac * d.x - ab * e.x, ac * d.y - ab * e.y, ac * d.z - ab * e.z, ac * d.w - ab * e.w);
+}
+
+bool is_curved(Material material, Vertices vertices) {
+    if (HAS_NORMAL_MAPS && material.normal_texture != NONE) return true;
+    mat3 n = vertices.corners;
+    return HAS_NORMALS && (n[0] != n[1] || n[0] != n[2]);
+}
+
+// `media` are those that the ray to the hit began in; `width` is that of the ray's cone at the hit.
+Surface surface_at(RenderConstants constants, Hit hit, vec3 wo, Media media, float width) {
     Surface s;
     TriangleVertices vertices = load_triangle(hit.triangle.slot);
     s.point = surface_point(constants, vertices, hit.triangle.instance, hit.barycentric);
     bool front = dot(s.point.geometric_normal, wo) > 0.0;
     s.side_normal = front ? s.point.geometric_normal : -s.point.geometric_normal;
     Vertices attributes = interpolate_vertices(constants, vertices.triangle, hit.triangle.instance, hit.barycentric);
+    if (HAS_MIP) attributes.footprint = texture_footprint(s.point, attributes, width);
     Material material = load_material(constants, vertices.material);
     s.bsdf = bsdf_parameters(constants, material, attributes, front);
     s.near = media;
@@ -93,6 +113,7 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo, Media media) {
     }
     bsdf_prepare(constants, s.bsdf, to_local(s.frame, wo));
     s.emission = emits_to_side(material, front) ? material_emission(constants, material, attributes.texcoords) : vec3(0.0);
+    s.curved = is_curved(material, attributes);
     s.light = vertices.light;
     if (HAS_INSTANCES && s.light != NONE && hit.triangle.instance != NONE)
         s.light += load_instance_header(constants, hit.triangle.instance).y;

@@ -47,9 +47,43 @@ float texel_coordinate(float x, uint size, uint mode) {
     return x * float(size);
 }
 
+// What a lookup stands for: the gradients over the surface, in any common frame, of the coordinates u and v of set 0, then
+// of set 1, each times the width of the ray cone. Zero where the lookup must be exact.
+const mat4x3 NO_FOOTPRINT = mat4x3(0.0);
+
+// The level of the mip chain whose texels are still no wider than the footprint in any direction: by the smaller singular value
+// of the map to texels, so that what is stretched is not blurred along its long side. It is |a × b| over the larger one, with
+// the gradients a and b of the two texel coordinates, which does not cancel. NaN, as of coordinates without area, is level 0.
+uint mip_level(TextureHeader header, mat4x3 footprint) {
+    bool second = (header.sampling & TEXTURE_SET_1) != 0u;
+    vec3 du = second ? footprint[2] : footprint[0];
+    vec3 dv = second ? footprint[3] : footprint[1];
+    vec3 a = (header.u_row.x * du + header.u_row.y * dv) * float(header.width);
+    vec3 b = (header.v_row.x * du + header.v_row.y * dv) * float(header.height);
+    float aa = dot(a, a);
+    float bb = dot(b, b);
+    float larger = sqrt(0.5 * (aa + bb + length(vec2(aa - bb, 2.0 * dot(a, b)))));
+    float texels = length(cross(a, b)) / larger;
+    if (!(texels >= 2.0)) return 0u;
+    return uint(min(findMSB(uint(min(texels, 65536.0))), findMSB(max(header.width, header.height))));
+}
+
+// The header of a level ≥ 1: its texels are linear and have 16 bits (src/prepare/mip.rs).
+TextureHeader mip_header(TextureHeader header, uint level) {
+    header.first_word = LOAD1(TEXELS, header.mips + level - 1u);
+    header.width = max(header.width >> level, 1u);
+    header.height = max(header.height >> level, 1u);
+    header.sampling = (header.sampling & ~TEXTURE_SRGB) | TEXTURE_16_BIT;
+    return header;
+}
+
 // `texcoords`: the two sets; the texture's header says which of them is looked up, and how it is transformed.
-vec4 sample_texture(RenderConstants constants, uint index, vec4 texcoords) {
+vec4 sample_texture(RenderConstants constants, uint index, vec4 texcoords, mat4x3 footprint) {
     TextureHeader header = load_texture_header(constants, index);
+    if (HAS_MIP && (header.sampling & TEXTURE_MIPS) != 0u) {
+        uint level = mip_level(header, footprint);
+        if (level > 0u) header = mip_header(header, level);
+    }
     vec2 uv = (header.sampling & TEXTURE_SET_1) != 0u ? texcoords.zw : texcoords.xy;
     if ((header.sampling & TEXTURE_TRANSFORMED) != 0u)
         uv = vec2(dot(header.u_row, vec3(uv, 1.0)), dot(header.v_row, vec3(uv, 1.0)));
@@ -62,6 +96,11 @@ vec4 sample_texture(RenderConstants constants, uint index, vec4 texcoords) {
     vec4 top = mix(fetch_texel(header, t), fetch_texel(header, t + ivec2(1, 0)), f.x);
     vec4 bottom = mix(fetch_texel(header, t + ivec2(0, 1)), fetch_texel(header, t + ivec2(1, 1)), f.x);
     return mix(top, bottom, f.y);
+}
+
+// An exact lookup.
+vec4 sample_texture(RenderConstants constants, uint index, vec4 texcoords) {
+    return sample_texture(constants, index, texcoords, NO_FOOTPRINT);
 }
 
 // Emitted radiance of a material at texture coordinates.

@@ -28,7 +28,7 @@ void main() {
     outputs[o + 11u] = uvec4(bits(light.cone_scale), bits(light.cone_offset), 0u, 0u);
     TextureHeader header = load_texture_header(constants, lane);
     outputs[o + 12u] = uvec4(header.first_word, header.width, header.height, header.sampling);
-    outputs[o + 13u] = uvec4(bits(header.u_row), 0u);
+    outputs[o + 13u] = uvec4(bits(header.u_row), header.mips);
     outputs[o + 14u] = uvec4(bits(header.v_row), 0u);
     Affine forward = load_object_to_world(constants, lane);
     Affine backward = load_world_to_object(constants, lane);

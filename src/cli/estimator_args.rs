@@ -31,6 +31,10 @@ pub(crate) struct EstimatorArgs {
     /// How --light-sampling mis weighs its samples.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<MisHeuristic>(MisHeuristic::NAMES), help_heading = "Light transport")]
     mis: MisHeuristic,
+    /// Look up every texture in the file's own texels; without it, those of colours and roughness in mip chains, by ray
+    /// cones that are a quarter of a pixel wide and widen at each scattering event.
+    #[arg(long, help_heading = "Light transport")]
+    no_mip: bool,
 
     /// Image of the environment (.hdr or .exr, latitude/longitude), in place of the scene's.
     #[arg(long, value_name = "FILE", help_heading = "Environment")]
@@ -104,6 +108,9 @@ impl EstimatorArgs {
         if self.device != DeviceChoice::Auto {
             add("device", self.device.to_string());
         }
+        if self.no_mip {
+            flags.push(String::from("--no-mip"));
+        }
         flags
     }
 
@@ -122,6 +129,7 @@ impl EstimatorArgs {
         settings.light_sampling = self.light_sampling;
         settings.mis_heuristic = self.mis;
         settings.env_sampling = self.env_sampling;
+        settings.mip = !self.no_mip;
         settings.trace = self.trace;
         settings.device = self.device;
         settings.shaders_dir = self.shaders;

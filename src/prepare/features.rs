@@ -16,6 +16,8 @@ pub struct Features {
     pub lights: u32,
     /// Any texture.
     pub textures: bool,
+    /// Any texture with a mip chain: paths carry ray cones.
+    pub mip: bool,
     /// Any emission texture.
     pub emission_textures: bool,
     /// Two-level traversal.
@@ -68,6 +70,7 @@ impl Features {
             ("black-back", self.black_back),
             ("emission", self.emission),
             ("textures", self.textures),
+            ("mip", self.mip),
             ("emission-textures", self.emission_textures),
             ("normals", self.normals),
             ("normal-maps", self.normal_maps),

@@ -4,11 +4,11 @@ use super::PrepareError;
 use super::alpha::Presence;
 use super::emission::EmissionMap;
 use super::features::Features;
-use super::textures::{ColorSpace, TextureTable};
+use super::textures::{ColorSpace, Lookup, TextureTable};
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_ALPHA_BLEND,
     MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK,
-    MATERIAL_VOLUME, Material, NONE, SLOT_MATERIAL_MASK, TEXTURE_SET_1,
+    MATERIAL_VOLUME, Material, NONE, SLOT_MATERIAL_MASK, TEXTURE_MIPS, TEXTURE_SET_1,
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding, Volume};
 
@@ -107,7 +107,8 @@ impl MaterialTable {
     }
 
     /// Adds what the materials need.
-    pub(super) fn add_features(&self, features: &mut Features) {
+    pub(super) fn add_features(&self, textures: &TextureTable, features: &mut Features) {
+        features.mip = textures.headers.iter().any(|header| header.sampling & TEXTURE_MIPS != 0);
         for record in &self.records {
             features.bsdfs |= 1 << (record.kind_flags & MATERIAL_KIND_MASK);
             features.textures |= textures_of(record).iter().any(|&texture| texture != NONE);
@@ -135,11 +136,14 @@ impl MaterialTable {
         if record_index > SLOT_MATERIAL_MASK {
             return Err(PrepareError::TooManyMaterials);
         }
-        let mut bind = |binding: Option<TextureBinding>, needed: bool, space: ColorSpace| match binding {
-            Some(binding) if needed => textures.add(scene, binding, space),
+        let mut bind = |binding: Option<TextureBinding>, needed: bool, space: ColorSpace, lookup: Lookup| match binding
+        {
+            Some(binding) if needed => textures.add(scene, binding, space, lookup),
             _ => Ok(NONE),
         };
         let alpha = presence != Presence::Opaque;
+        // The colour of what is not there is anything: it must not be mixed into that of what is.
+        let color_lookup = if alpha { Lookup::Exact } else { Lookup::Filtered };
         let shaded = material.bsdf != Bsdf::Unlit;
         let rough = material.bsdf == Bsdf::MetallicRoughness;
         // KHR_materials_unlit: emission is ignored.
@@ -164,10 +168,21 @@ impl MaterialTable {
                 material.base_color_texture,
                 alpha || material.base_color != [0.0; 3],
                 ColorSpace::Srgb,
+                color_lookup,
             )?,
-            metallic_roughness_texture: bind(material.metallic_roughness_texture, rough, ColorSpace::Linear)?,
-            emission_texture: bind(material.emission_texture, emissive, ColorSpace::Srgb)?,
-            normal_texture: bind(material.normal_texture, shaded && material.normal_scale != 0.0, ColorSpace::Linear)?,
+            metallic_roughness_texture: bind(
+                material.metallic_roughness_texture,
+                rough,
+                ColorSpace::Linear,
+                Lookup::Filtered,
+            )?,
+            emission_texture: bind(material.emission_texture, emissive, ColorSpace::Srgb, Lookup::Exact)?,
+            normal_texture: bind(
+                material.normal_texture,
+                shaded && material.normal_scale != 0.0,
+                ColorSpace::Linear,
+                Lookup::Exact,
+            )?,
             specular_color: material.specular_color,
             specular: material.specular,
             absorption: material.volume.map_or([0.0; 3], absorption),
@@ -176,10 +191,20 @@ impl MaterialTable {
             anisotropy_turns: material.anisotropy_rotation_radians / std::f32::consts::TAU,
             normal_scale: material.normal_scale,
             unused: 0,
-            transmission_texture: bind(material.transmission_texture, transmission > 0.0, ColorSpace::Linear)?,
-            specular_texture: bind(material.specular_texture, rough && material.specular > 0.0, ColorSpace::Linear)?,
-            specular_color_texture: bind(material.specular_color_texture, rough, ColorSpace::Srgb)?,
-            anisotropy_texture: bind(material.anisotropy_texture, anisotropy > 0.0, ColorSpace::Linear)?,
+            transmission_texture: bind(
+                material.transmission_texture,
+                transmission > 0.0,
+                ColorSpace::Linear,
+                Lookup::Filtered,
+            )?,
+            specular_texture: bind(
+                material.specular_texture,
+                rough && material.specular > 0.0,
+                ColorSpace::Linear,
+                Lookup::Filtered,
+            )?,
+            specular_color_texture: bind(material.specular_color_texture, rough, ColorSpace::Srgb, Lookup::Filtered)?,
+            anisotropy_texture: bind(material.anisotropy_texture, anisotropy > 0.0, ColorSpace::Linear, Lookup::Exact)?,
         };
         let mut texcoord_sets = [false; 2];
         for texture in textures_of(&record).into_iter().filter(|&texture| texture != NONE) {

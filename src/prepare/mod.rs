@@ -17,6 +17,7 @@ mod ggx;
 mod instances;
 mod lights;
 mod materials;
+mod mip;
 mod pack;
 mod textures;
 mod vertices;
@@ -52,6 +53,8 @@ pub struct PrepareOptions {
     pub environment_sampling: EnvironmentSampling,
     /// The environment is among the lights that are picked; otherwise only rays that leave the scene find it.
     pub sample_environment: bool,
+    /// Makes mip chains, by which textures are looked up as finely as the path that asks needs it.
+    pub mip: bool,
     /// Bakes every instance into the world: more memory, one level of traversal.
     pub bake_instances: bool,
 }
@@ -62,6 +65,7 @@ impl Default for PrepareOptions {
             camera: DVec3::ZERO,
             environment_sampling: EnvironmentSampling::Importance,
             sample_environment: true,
+            mip: true,
             bake_instances: false,
         }
     }
@@ -194,7 +198,7 @@ pub struct Statistics {
 /// If something in it is larger or further away than the layout can express.
 pub fn prepare(scene: &Scene, options: &PrepareOptions) -> Result<Prepared, PrepareError> {
     let start = Instant::now();
-    let mut textures = TextureTable::default();
+    let mut textures = TextureTable::new(options.mip);
     let materials = MaterialTable::new(scene, &mut textures)?;
     let bvh_start = Instant::now();
     let mut geometry = geometry::gather(scene, options, &materials)?;
@@ -205,7 +209,7 @@ pub fn prepare(scene: &Scene, options: &PrepareOptions) -> Result<Prepared, Prep
     let environment = environment::prepare(&scene.environment, sampling)?;
     let lights =
         lights::gather(scene, &geometry, &mut acceleration, &materials, &environment, options.sample_environment)?;
-    let features = pack::features(&geometry, &acceleration, &materials, &environment, &lights);
+    let features = pack::features(&geometry, &acceleration, &materials, &textures, &environment, &lights);
     let mut statistics = pack::statistics(&acceleration, &lights);
     let instances = pack::prepared_instances(&acceleration);
     let meshes = std::mem::take(&mut acceleration.meshes);

@@ -104,6 +104,7 @@ pub(super) fn features(
     geometry: &Geometry,
     acceleration: &Acceleration,
     materials: &MaterialTable,
+    textures: &TextureTable,
     environment: &PreparedEnvironment,
     lights: &LightTable,
 ) -> Features {
@@ -117,7 +118,7 @@ pub(super) fn features(
         environment_importance: environment.conditional_word != 0,
         ..Features::default()
     };
-    materials.add_features(&mut features);
+    materials.add_features(textures, &mut features);
     // Without tangents it has no direction.
     features.anisotropy &= any(TRIANGLE_TANGENTS);
     features

@@ -81,6 +81,7 @@ impl KernelKey {
             f.specular,
             f.transmission,
             f.volume,
+            f.mip,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {

@@ -44,6 +44,7 @@ pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Res
     let options = PrepareOptions {
         camera: camera.camera_to_world.translation,
         environment_sampling: settings.env_sampling,
+        mip: settings.mip,
         ..PrepareOptions::default()
     };
     Ok(prepare::prepare(scene, &options)?)

@@ -45,6 +45,8 @@ pub struct Settings {
     pub env_sampling: EnvironmentSampling,
     /// The pixel filter.
     pub filter: PixelFilter,
+    /// Look textures up in mip chains by ray cones, not in the files' texels alone.
+    pub mip: bool,
     /// Which implementation traces rays.
     pub trace: TraceChoice,
     /// Which device renders.
@@ -75,6 +77,7 @@ impl Default for Settings {
             mis_heuristic: MisHeuristic::default(),
             env_sampling: EnvironmentSampling::default(),
             filter: PixelFilter::default(),
+            mip: true,
             trace: TraceChoice::default(),
             device: DeviceChoice::default(),
             shaders_dir: None,

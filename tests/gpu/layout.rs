@@ -217,7 +217,7 @@ fn records_survive_the_way_to_the_shader() {
     let materials: Vec<layout::Material> = random_records(&mut random);
     let lights: Vec<layout::Light> = random_records(&mut random);
     let mut headers: Vec<layout::TextureHeader> = random_records(&mut random);
-    headers.iter_mut().for_each(|header| header.sampling |= layout::TEXTURE_TRANSFORMED);
+    headers.iter_mut().for_each(|header| header.sampling |= layout::TEXTURE_TRANSFORMED | layout::TEXTURE_MIPS);
     let instances: Vec<layout::InstanceRecord> = random_records(&mut random);
     let leaves: Vec<layout::LeafSlot> = random_records(&mut random);
     let vertices: Vec<layout::Vertex> = random_records(&mut random);
@@ -252,7 +252,7 @@ fn records_survive_the_way_to_the_shader() {
         assert_eq!(&output[..8], bytemuck::cast_slice::<_, [u32; 4]>(&[materials[i]]), "material");
         let light = layout::Light { unused: [0; 2], ..lights[i] };
         assert_eq!(&output[8..12], bytemuck::cast_slice::<_, [u32; 4]>(&[light]), "light");
-        let header = layout::TextureHeader { unused: 0, unused_too: 0, ..headers[i] };
+        let header = layout::TextureHeader { unused: 0, ..headers[i] };
         assert_eq!(&output[12..15], bytemuck::cast_slice::<_, [u32; 4]>(&[header]), "texture header");
         assert_eq!(&output[15..22], bytemuck::cast_slice::<_, [u32; 4]>(&[instances[i]]), "instance");
         assert_eq!(output[22..25], decoded_leaf(&leaves[i]), "leaf slot");

@@ -18,6 +18,7 @@ mod error_estimate;
 mod furnace;
 mod layout;
 mod light_sampling;
+mod mip;
 mod mitsuba_bsdfs;
 mod mitsuba_images;
 mod mutations;

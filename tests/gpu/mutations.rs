@@ -142,6 +142,22 @@ mutations! {
     albedo_of_other_grooves: "include/ggx.glsl",
         "if (alpha.x < alpha.y) horizontal" => "if (alpha.x > alpha.y) horizontal",
         caught by "bsdf_chi_square::anisotropic_lobes_give_back_what_they_get";
+    /// A cone of two pixels.
+    wide_cone: "include/ray_cone.glsl",
+        "CONE_PIXEL_SHARE = 0.25" => "CONE_PIXEL_SHARE = 2.0",
+        caught by "mip::what_is_seen_stays_sharp";
+    /// A lens that does not focus cones.
+    cone_through_a_lens: "include/ray_cone.glsl",
+        "if (curved) return RayCone(0.0, 0.0);" => "",
+        caught by "mip::what_is_seen_stays_sharp";
+    /// Stretched textures are blurred along their long side.
+    level_by_the_larger_side: "include/texture.glsl",
+        "length(cross(a, b)) / larger" => "larger",
+        caught by "mip::lookups_read_the_level_that_fits_the_footprint";
+    /// Linear texels decoded as sRGB.
+    mip_decoded_twice: "include/texture.glsl",
+        "(header.sampling & ~TEXTURE_SRGB) | TEXTURE_16_BIT" => "header.sampling | TEXTURE_16_BIT",
+        caught by "mip::lookups_read_the_level_that_fits_the_footprint";
 }
 
 /// A call of a shader function and a render pass with the same sources read from a folder: what fails is the mutant.
