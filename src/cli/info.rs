@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 use serde_json::{Value, json};
-use sunfleck::scene::{Bsdf, Environment, Projection, PunctualKind, Scene, load};
+use sunfleck::scene::{AlphaMode, Bsdf, Environment, Lobe, Material, Projection, PunctualKind, Scene, load};
 
 use sunfleck::prepare::Prepared;
 use sunfleck::render::{Settings, prepare_scene};
@@ -20,6 +20,9 @@ pub(crate) struct InfoArgs {
     #[arg(long)]
     json: bool,
 }
+
+/// Materials that people are shown.
+const MATERIALS_SHOWN: usize = 24;
 
 /// Describes the scene.
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
@@ -109,6 +112,7 @@ fn describe(scene: &Scene) -> Value {
         "emissive_triangles": counts.emissive_triangles,
         "materials": scene.materials.len(),
         "materials_by_bsdf": counts.materials_by_bsdf,
+        "material_list": scene.materials.iter().map(material).collect::<Vec<_>>(),
         "textures": scene.textures.len(),
         "images": images,
         "image_bytes": counts.image_bytes,
@@ -118,6 +122,42 @@ fn describe(scene: &Scene) -> Value {
         "notes": scene.notes,
         "warnings": scene.warnings,
     })
+}
+
+fn material(material: &Material) -> Value {
+    let alpha = match material.alpha_mode {
+        AlphaMode::Opaque => "opaque",
+        AlphaMode::Mask { .. } => "mask",
+        AlphaMode::Blend => "blend",
+    };
+    json!({
+        "name": material.name,
+        "bsdf": bsdf_name(material.bsdf),
+        "lobes": material.lobes().into_iter().map(Lobe::name).collect::<Vec<_>>(),
+        "textures": material.texture_uses(),
+        "alpha": alpha,
+    })
+}
+
+/// One line a material: its lobes, its textures, and alpha if it has a meaning.
+fn print_materials(materials: &[Material]) {
+    for (index, material) in materials.iter().enumerate().take(MATERIALS_SHOWN) {
+        let lobes: Vec<_> = material.lobes().into_iter().map(Lobe::name).collect();
+        let mut line = if lobes.is_empty() { String::from("black") } else { lobes.join(", ") };
+        let textures = material.texture_uses();
+        if !textures.is_empty() {
+            line += &format!("; textures: {}", textures.join(", "));
+        }
+        match material.alpha_mode {
+            AlphaMode::Opaque => {}
+            AlphaMode::Mask { cutoff } => line += &format!("; alpha mask at {cutoff}"),
+            AlphaMode::Blend => line += "; alpha blend",
+        }
+        eprintln!("  material {index:<3} '{}': {line}", material.name);
+    }
+    if materials.len() > MATERIALS_SHOWN {
+        eprintln!("               and {} more (--json lists them all)", materials.len() - MATERIALS_SHOWN);
+    }
 }
 
 fn camera(index: usize, camera: &sunfleck::scene::Camera) -> Value {
@@ -202,6 +242,7 @@ fn print_for_people(scene: &Scene) {
     );
     eprintln!("  instances    {}, {} triangles", scene.instances.len(), counts.instanced_triangles);
     eprintln!("  materials    {} ({})", scene.materials.len(), by_bsdf.join(", "));
+    print_materials(&scene.materials);
     let megabytes = counts.image_bytes as f64 / 1e6;
     eprintln!("  textures     {} of {} images, {megabytes:.1} MB decoded", scene.textures.len(), scene.images.len());
     let count = |wanted: &str| scene.lights.iter().filter(|l| light_kind(l.kind) == wanted).count();

@@ -136,6 +136,7 @@ fn info_describes_the_built_in_scene() {
     assert_eq!(code, 0, "{stderr}");
     let info: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!(info["materials_by_bsdf"]["lambertian"], info["materials"]);
+    assert_eq!(info["material_list"][0]["lobes"], serde_json::json!(["diffuse"]));
     assert_eq!(info["cameras"].as_array().unwrap().len(), 1);
     assert!(info["triangles"].as_u64().unwrap() >= 30);
     assert!(stderr.contains("triangles"));
