@@ -22,6 +22,7 @@ mod mip;
 mod mitsuba_bsdfs;
 mod mitsuba_images;
 mod mutations;
+mod reciprocity;
 mod sampler;
 mod shader_math;
 mod shaders_valid;
