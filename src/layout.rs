@@ -233,7 +233,7 @@ pub const DIELECTRIC_ALBEDO_SIZE: [u32; 3] = [40, 20, 40];
 
 /// Nodes of the table of anisotropic albedos along each of its coordinates: direction (polar angle), azimuth, ratio of the
 /// two roughnesses, larger roughness.
-pub const GGX_ANISOTROPIC_SIZES: [u32; 4] = [24, 8, 12, 20];
+pub const GGX_ANISOTROPIC_SIZES: [u32; 4] = [24, 12, 12, 20];
 
 /// Texels a material takes.
 pub const MATERIAL_TEXELS: u32 = 8;

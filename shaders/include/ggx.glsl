@@ -69,16 +69,17 @@ struct GgxAlbedo {
 GgxAlbedo ggx_albedo_of(vec2 entry, float cos_o, float stretched) {
     float remaining = 1.0 - (cos_o + stretched * entry.y);
     float squared = remaining * remaining;
-    return GgxAlbedo(entry.x, entry.x * squared * squared * remaining);
+    // What is raised may pass 1, but what is under a reflection cannot get less than nothing.
+    return GgxAlbedo(entry.x, min(entry.x, 1.0) * squared * squared * remaining);
 }
 
 // What the two numbers of the table below are stored in units of.
 const vec2 GGX_ANISOTROPIC_UNITS = vec2(2.0, 8.0);
 
-// Where the two roughnesses differ, the azimuth of the stretched direction and √(smaller/larger) are coordinates too, and
-// √larger takes the place of √α. The direction that is stretched by both resolves what happens when one sees along the
-// grooves, however deep they are: the table is good to a percent at every ratio. Texels hold the four nodes of a cell
-// of polar angle and azimuth.
+// Where the two roughnesses differ, azimuth and √(smaller/larger) are coordinates too, and √larger takes the place of √α.
+// Stretched by both, directions resolve what happens when one sees along the grooves, however deep they are. The azimuth is
+// the mean of the stretched direction's and wo's own, which the stretched one hardly tells apart where the ratio is large.
+// The table is good to a percent at every ratio. Texels hold the four nodes of a cell of polar angle and azimuth.
 vec2 ggx_anisotropic_cell(uint cell, vec2 f) {
     uvec4 nodes = LOAD4(TABLES, cell);
     return mix(mix(unpackSnorm2x16(nodes.x), unpackSnorm2x16(nodes.y), f.x),
@@ -86,11 +87,11 @@ vec2 ggx_anisotropic_cell(uint cell, vec2 f) {
 }
 
 GgxAlbedo ggx_anisotropic_albedo(uint table, vec3 wo, vec2 alpha) {
-    vec2 horizontal = abs(alpha * wo.xz);
-    if (alpha.x < alpha.y) horizontal = horizontal.yx;
+    vec2 own = abs(alpha.x < alpha.y ? wo.zx : wo.xz);
+    vec2 horizontal = own * vec2(max(alpha.x, alpha.y), min(alpha.x, alpha.y));
     float larger = max(alpha.x, alpha.y);
     float stretched = ggx_stretched_length(wo, alpha);
-    vec4 at = vec4(sqrt(wo.y / (stretched + length(horizontal))), 4.0 * turns(horizontal.y, horizontal.x),
+    vec4 at = vec4(sqrt(wo.y / (stretched + length(horizontal))), 2.0 * (turns(horizontal.y, horizontal.x) + turns(own.y, own.x)),
                    sqrt(min(alpha.x, alpha.y) / larger), sqrt(larger)) *
               vec4(GGX_ANISOTROPIC_SIZES - 1u);
     uvec4 node = min(uvec4(at), GGX_ANISOTROPIC_SIZES - 2u);

@@ -34,7 +34,7 @@ const uint MATERIAL_TEXELS = 8u;
 
 const uint GGX_ALBEDO_SIZE = 48u;
 const uvec3 DIELECTRIC_ALBEDO_SIZE = uvec3(40u, 20u, 40u);
-const uvec4 GGX_ANISOTROPIC_SIZES = uvec4(24u, 8u, 12u, 20u);
+const uvec4 GGX_ANISOTROPIC_SIZES = uvec4(24u, 12u, 12u, 20u);
 
 const uint TEXTURE_SRGB = 1u;
 const uint TEXTURE_16_BIT = 2u;

@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::OnceLock;
 
-use glam::{DVec2, DVec3, Vec2Swizzles};
+use glam::{DVec2, DVec3};
 use sunfleck::layout::{GGX_ALBEDO_SIZE, GGX_ANISOTROPIC_SIZES};
 
 use super::half_vector_bins::gauss_legendre;
@@ -62,17 +62,31 @@ pub fn entry(x: f64, y: f64, order: usize) -> [f32; 2] {
 }
 
 /// A node of the table of unequal roughness: (polar angle, azimuth, ratio, larger roughness), each in [0, 1]. The albedo is
-/// raised by as much as the table can be too low between its nodes, so that what is given back is never too much.
+/// raised, and the offset lowered, by as much as the table can be wrong between its nodes, so that what is given back is never
+/// too much.
+///
+/// At a polar angle of zero the offset is that of directions near it. The one along the normal itself is that of the few
+/// facets that are tilted most, which the fifth power leaves there, and wo's that are as near to it once they are
+/// stretched, though they may be nearly at the horizon, see another. Along the normal Schlick's albedo is nearly zero with
+/// either.
 pub fn anisotropic_entry([x, azimuth, ratio, y]: [f64; 4], order: usize) -> [i16; 2] {
     let larger = (y * y).max(SMALLEST_ALPHA);
     let alpha = [larger, (larger * ratio * ratio).max(SMALLEST_ALPHA)];
-    let [white, offset] = numbers(direction(x, azimuth * FRAC_PI_2, alpha), alpha, order);
-    let margin = 1.2e-3 + 5e-3 * (4.0 * larger).min(1.0);
-    [white * (1.0 + margin) / UNITS[0], offset / UNITS[1]].map(|number| {
+    let at = |x: f64| numbers(direction(x, stretched_azimuth(azimuth, alpha), alpha), alpha, order);
+    let [white, offset] = at(x);
+    let offset = if x == 1.0 { at(NEAR_THE_NORMAL)[1] } else { offset };
+    let narrow = (1.0 - 10.0 * larger).max(0.0);
+    // Towards the horizon it grows faster than the table's coordinate tells.
+    let horizon = (1.0 - 10.0 * x).max(0.0);
+    let lowered = offset * (1.0 - horizon * (0.005 + 0.04 * narrow)) - 0.005 - 0.006 * narrow;
+    [white * 1.0032 / UNITS[0], lowered / UNITS[1]].map(|number| {
         assert!(number.abs() <= 1.0, "{number} cannot be stored");
         (number * SNORM).round() as i16
     })
 }
+
+/// The polar coordinate whose offset stands for the normal's.
+const NEAR_THE_NORMAL: f64 = 0.985;
 
 /// What a stored number is divided by.
 const SNORM: f64 = 32767.0;
@@ -90,6 +104,22 @@ fn numbers(wo: DVec3, alpha: [f64; 2], order: usize) -> [f64; 2] {
     [a.white, (cosine - wo.y) / length]
 }
 
+/// The azimuth ψ of the stretched direction at the coordinate (φ + ψ)/π, where φ is that of the direction itself: tan ψ =
+/// tan φ · smaller/larger.
+fn stretched_azimuth(coordinate: f64, [larger, smaller]: [f64; 2]) -> f64 {
+    let sum = coordinate * PI;
+    let stretched = |azimuth: f64| (azimuth.sin() * smaller / larger).atan2(azimuth.cos());
+    if coordinate >= 1.0 {
+        return FRAC_PI_2;
+    }
+    let mut bounds = [0.0, FRAC_PI_2];
+    for _ in 0..64 {
+        let middle = 0.5 * (bounds[0] + bounds[1]);
+        bounds[usize::from(middle + stretched(middle) > sum)] = middle;
+    }
+    sum - bounds[0]
+}
+
 /// The direction at a table's coordinates: the stretched direction's polar angle φ has tan(π/4 − φ/2) = x², and it has the
 /// given azimuth from +X on.
 pub fn direction(x: f64, azimuth: f64, alpha: [f64; 2]) -> DVec3 {
@@ -102,7 +132,8 @@ pub fn direction(x: f64, azimuth: f64, alpha: [f64; 2]) -> DVec3 {
 /// The tables as they are stored, between their nodes: what the shader's `ggx_albedo` computes.
 pub fn stored(wo: DVec3, alpha: [f64; 2]) -> Albedo {
     let [ax, az] = alpha;
-    let horizontal = DVec2::new((ax * wo.x).abs(), (az * wo.z).abs());
+    let own = DVec2::new(wo.x.abs(), wo.z.abs());
+    let horizontal = own * DVec2::new(ax, az);
     let length = horizontal.length().hypot(wo.y);
     let x = (wo.y / (length + horizontal.length())).sqrt();
     let [white, offset] = if ax == az {
@@ -110,11 +141,11 @@ pub fn stored(wo: DVec3, alpha: [f64; 2]) -> Albedo {
         interpolate(nodes(), [size, size], [x, ax.sqrt()])
     } else {
         let (larger, smaller) = (ax.max(az), ax.min(az));
-        let along = if ax < az { horizontal.yx() } else { horizontal };
-        let at = [x, along.y.atan2(along.x) / FRAC_PI_2, (smaller / larger).sqrt(), larger.sqrt()];
+        let azimuth = |v: DVec2| if ax < az { v.x.atan2(v.y) } else { v.y.atan2(v.x) };
+        let at = [x, (azimuth(horizontal) + azimuth(own)) / PI, (smaller / larger).sqrt(), larger.sqrt()];
         interpolate(anisotropic_nodes(), GGX_ANISOTROPIC_SIZES.map(|size| size as usize), at)
     };
-    Albedo { white, schlick: white * (1.0 - wo.y - length * offset).powi(5) }
+    Albedo { white, schlick: white.min(1.0) * (1.0 - wo.y - length * offset).powi(5) }
 }
 
 fn nodes() -> &'static [[f64; 2]] {

@@ -76,17 +76,15 @@ fn the_anisotropic_table_holds_what_the_quadrature_gives() {
 }
 
 /// Between its nodes the table is never so low that a white metal would give back more than it gets by a thousandth, nor so
-/// high that it would lose a hundredth, at any ratio of the roughnesses, angle and azimuth. The share of Schlick's term, which
-/// decides over the base under a dielectric, is not as well known where the roughnesses differ much: there it is too large.
+/// high that it would lose a hundredth, at any ratio of the roughnesses, angle and azimuth; and so for a white dielectric, whose
+/// base gets what the table says that its lobe leaves.
 #[test]
 fn the_anisotropic_table_is_good_between_its_nodes() {
     let octaves = [1.0_f64, 1.5, 2.0, 4.0, 8.0, 16.0, 64.0, 4096.0];
-    // What dielectrics may lose.
-    let losses = [0.008, 0.008, 0.011, 0.013, 0.03, 0.1, 0.15];
-    for (ratios, loss) in octaves.windows(2).zip(losses) {
+    for ratios in octaves.windows(2) {
         let mut random = Random(ratios[1].to_bits());
         let mut draw = || random.unit();
-        let points: Vec<_> = (0..1 << 11)
+        let points: Vec<_> = (0..1 << 12)
             .map(|i| {
                 let larger = if i % 2 == 0 { draw() } else { draw().powi(2) }.max(2.0_f64.powi(-12));
                 let ratio = 1.0 / (ratios[0] + (ratios[1] - ratios[0]) * draw());
@@ -110,7 +108,6 @@ fn the_anisotropic_table_is_good_between_its_nodes() {
                 let f0 = 0.04;
                 let lobe = |a: Albedo| f0 * (a.white - a.schlick) + a.schlick;
                 let dielectric = (lobe(exact) - lobe(stored)) * (1.0 + f0 * (1.0 - stored.white) / stored.white);
-                assert!((-1e-2..=1e-3).contains(&metal), "alpha {alpha:?}, wo {wo}: 1 {metal:+.2e} come back");
                 [metal, dielectric]
             })
             .collect();
@@ -118,7 +115,7 @@ fn the_anisotropic_table_is_good_between_its_nodes() {
             let limits = errors.iter().fold([0.0_f64; 2], |[low, high], e| [low.min(e[k]), high.max(e[k])]);
             let [low, high] = ratios else { unreachable!("pairs") };
             println!("ratio {low} to {high}, {what}: 1 {:+.2e} to 1 {:+.2e} come back", limits[0], limits[1]);
-            assert!(k == 0 || limits[0] > -loss && limits[1] < 1e-2, "ratio {low} to {high}: {limits:?}");
+            assert!(limits[0] >= -1e-2 && limits[1] <= 1e-3, "ratio {low} to {high}: {limits:?}");
         }
     }
 }
