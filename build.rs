@@ -23,7 +23,7 @@ fn main() {
         code.push_str("    [");
         for form in 0..3 {
             let defines = [("TRACE_BACKEND", backend.to_string()), ("ARRAY_FORM", form.to_string())];
-            let spirv = match shader_compiler::compile(&sources, "path_trace.comp", &defines, true) {
+            let spirv = match shader_compiler::compile(&sources, "path_trace.comp", &defines) {
                 Ok(spirv) => spirv,
                 Err(error) => {
                     println!("cargo::error={}", error.to_string().replace('\n', " | "));

@@ -3,13 +3,12 @@
 // chunks of 2^CHUNK_SHIFT texels; CHUNK_SHIFT 31 means that none is.
 #ifndef ARRAYS_GLSL
 #define ARRAYS_GLSL
-#include "specialized.glsl"
 
 #define FORM_TEXEL_BUFFER 0
 #define FORM_STORAGE_BUFFER 1
 #define FORM_DEVICE_ADDRESS 2
 
-SPECIALIZED_CONSTANT(1, CHUNK_SHIFT, 31u)
+layout(constant_id = 1) const uint CHUNK_SHIFT = 31u;
 
 // Chunk c of array a is element 4·a + c. All indices below are constants: dynamic indexing of descriptors is a feature
 // that not every device has.

@@ -2,16 +2,15 @@
 // is src/gpu/kernel.rs. The defaults switch everything on.
 #ifndef FEATURES_GLSL
 #define FEATURES_GLSL
-#include "specialized.glsl"
 
-SPECIALIZED_CONSTANT(2, BSDFS, 0x3fu)
-SPECIALIZED_CONSTANT(3, LIGHTS, 0x1fu)
-SPECIALIZED_CONSTANT(4, FEATURES, 0xffffffffu)
-SPECIALIZED_CONSTANT(5, INTEGRATOR, 7u)
-SPECIALIZED_CONSTANT(6, LIGHT_SAMPLING, 0u)
-SPECIALIZED_CONSTANT(7, MIS_HEURISTIC, 1u)
-SPECIALIZED_CONSTANT(8, ENVIRONMENT_SAMPLING, 0u)
-SPECIALIZED_CONSTANT(9, STACK_SIZE, 64u)
+layout(constant_id = 2) const uint BSDFS = 0x3fu;
+layout(constant_id = 3) const uint LIGHTS = 0x1fu;
+layout(constant_id = 4) const uint FEATURES = 0xffffffffu;
+layout(constant_id = 5) const uint INTEGRATOR = 7u;
+layout(constant_id = 6) const uint LIGHT_SAMPLING = 0u;
+layout(constant_id = 7) const uint MIS_HEURISTIC = 1u;
+layout(constant_id = 8) const uint ENVIRONMENT_SAMPLING = 0u;
+layout(constant_id = 9) const uint STACK_SIZE = 64u;
 
 const bool HAS_TEXTURES = (FEATURES & 1u) != 0u;
 const bool HAS_INSTANCES = (FEATURES & 2u) != 0u;

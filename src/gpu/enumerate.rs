@@ -61,8 +61,6 @@ pub struct DeviceInfo {
     pub driver: String,
     /// Class of the device.
     pub kind: DeviceKind,
-    /// The driver compiles also what specialisation constants leave dead (SwiftShader): a kernel must not hold it.
-    pub compiles_dead_code: bool,
     /// Vulkan version it offers.
     pub api_version: (u32, u32, u32),
     /// Bytes of device-local memory.
@@ -132,7 +130,6 @@ fn describe(instance: &Instance, index: usize, raw: vk::PhysicalDevice) -> Devic
         name,
         driver: driver_text,
         kind: kind(base.device_type),
-        compiles_dead_code: driver.driver_id == vk::DriverId::GOOGLE_SWIFTSHADER,
         api_version: (vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v)),
         memory_bytes: device_local_bytes(instance, raw),
         ray_query: features.ray_query,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::specialize::specialize;
 use super::{AccelerationStructures, Buffer, Gpu, GpuError, GpuResult};
 
 /// How the shader traces rays (macro TRACE_BACKEND).
@@ -90,6 +91,8 @@ pub struct KernelDescription<'a> {
     pub workgroup_size: u32,
     /// Further specialisation constants: id and value.
     pub constants: &'a [(u32, u32)],
+    /// Leave all specialisation to the driver, as where [`specialize`] cannot do it.
+    pub driver_specializes: bool,
     /// Bytes of push constants.
     pub push_constant_bytes: u32,
     /// For each set of resources, the bindings 0, 1, 2, …: all sets have the same types.
@@ -179,7 +182,9 @@ impl Kernel {
         let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
         let specialization =
             vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
-        let module_info = vk::ShaderModuleCreateInfo::default().code(description.spirv);
+        let specialized = if description.driver_specializes { None } else { specialize(description.spirv, &constants) };
+        let module_info =
+            vk::ShaderModuleCreateInfo::default().code(specialized.as_deref().unwrap_or(description.spirv));
         // SAFETY: the SPIR-V is from our compiler; all pointers outlive the calls; the module may go once the pipeline
         // is made.
         unsafe {

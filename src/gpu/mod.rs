@@ -10,6 +10,7 @@ mod error;
 mod instance;
 mod kernel;
 pub mod shader_compiler;
+pub mod specialize;
 mod submit;
 
 pub use acceleration_structure::{AccelerationStructures, InstanceGeometry, MeshGeometry, MeshPart};

@@ -65,6 +65,7 @@ impl FunctionCall<'_> {
                 spirv: &spirv,
                 workgroup_size: 64,
                 constants: &specialization,
+                driver_specializes: false,
                 push_constant_bytes: 4,
                 sets: &[&set],
             },
@@ -80,6 +81,6 @@ impl FunctionCall<'_> {
         let mut defines =
             vec![("TRACE_BACKEND", (self.trace as u32).to_string()), ("ARRAY_FORM", (form as u32).to_string())];
         defines.extend(self.defines.iter().map(|(name, value)| (*name, value.clone())));
-        shader_compiler::compile(self.sources, self.file, &defines, true).map_err(|e| Error::Usage(e.to_string()))
+        shader_compiler::compile(self.sources, self.file, &defines).map_err(|e| Error::Usage(e.to_string()))
     }
 }

@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 use std::ops::{ControlFlow, Range};
-use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -35,6 +34,8 @@ pub struct BindingOverride {
     pub slice_lanes: Option<u32>,
     /// Rays a lane may trace in one dispatch.
     pub ray_budget: Option<u32>,
+    /// The driver puts in the specialisation constants, not [`crate::gpu::specialize`].
+    pub driver_specializes: bool,
 }
 
 /// A scene on a device, ready to be rendered.
@@ -238,7 +239,7 @@ fn build_kernel(
     constants: &Buffer,
     slices: &[Slice],
 ) -> Result<Kernel> {
-    let spirv = kernel_spirv(gpu, key, settings)?;
+    let spirv = kernel_spirv(key, settings)?;
     let arrays = buffers.bindings();
     let array_binding = array_binding(buffers, key.array_form, &arrays);
     let sets: Vec<Vec<BindingResource<'_>>> = slices
@@ -263,35 +264,21 @@ fn build_kernel(
             spirv: &spirv,
             workgroup_size,
             constants: &key.specialization(),
+            driver_specializes: overrides.driver_specializes,
             push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
             sets: &sets,
         },
     )?)
 }
 
-/// The embedded variant, or one compiled from `--shaders`; on a driver that compiles what specialisation leaves dead, one
-/// compiled for this key alone.
-fn kernel_spirv(gpu: &Gpu, key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
-    let for_this_key = gpu.info.compiles_dead_code;
-    if settings.shaders_dir.is_none() && !for_this_key {
+/// The embedded variant, or one compiled from `--shaders`.
+fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
+    let Some(folder) = &settings.shaders_dir else {
         let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
         return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
-    }
-    let sources = match &settings.shaders_dir {
-        Some(folder) => {
-            shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?
-        }
-        None => embedded::SOURCES.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect(),
     };
-    let constants = if for_this_key { key.specialization() } else { Vec::new() };
-    let names: Vec<String> = constants.iter().map(|(id, _)| format!("SPECIALIZED_{id}")).collect();
-    let mut defines =
-        vec![("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
-    if for_this_key {
-        defines.push(("SPECIALIZED", String::from("1")));
-    }
-    defines.extend(names.iter().zip(&constants).map(|(name, (_, value))| (name.as_str(), format!("{value}u"))));
-    let folder = settings.shaders_dir.as_deref().unwrap_or(Path::new("shaders"));
-    shader_compiler::compile(&sources, "path_trace.comp", &defines, true)
-        .map_err(|e| Error::input(folder, e.to_string()))
+    let sources = shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
+    let defines =
+        [("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
+    shader_compiler::compile(&sources, "path_trace.comp", &defines).map_err(|e| Error::input(folder, e.to_string()))
 }

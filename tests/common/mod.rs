@@ -16,5 +16,6 @@ pub mod mutation;
 pub mod random;
 pub mod reference;
 pub mod scenes;
+pub mod spirv;
 pub mod statistics;
 pub mod trace;

@@ -39,7 +39,7 @@ fn slices_workgroups_and_budgets_do_not_change_a_bit() {
         for (slice_lanes, workgroup_size, ray_budget) in
             [(None, None, None), (Some(1000), Some(32), None), (Some(4096), Some(128), Some(3)), (None, None, Some(50))]
         {
-            let overrides = BindingOverride { slice_lanes, workgroup_size, ray_budget, array_form: None };
+            let overrides = BindingOverride { slice_lanes, workgroup_size, ray_budget, ..BindingOverride::default() };
             let other = film(name, &settings(), overrides, 0..40);
             assert_eq!(bits(&reference), bits(&other), "{name}, {overrides:?}");
         }
@@ -61,6 +61,16 @@ fn the_form_of_the_arrays_and_their_chunks_do_not_change_a_bit() {
     for form in forms {
         let overrides = BindingOverride { array_form: Some(form), ..BindingOverride::default() };
         assert_eq!(bits(&reference), bits(&film(scene_name, &settings(), overrides, 0..16)), "{form:?}");
+    }
+}
+
+/// Specialisation before the driver does what the driver's does, with every kind of material and light at least once.
+#[test]
+fn who_specializes_does_not_change_a_bit() {
+    for name in some(&["textured", "cornell_spheres", "volumes", "environment", "punctual"]) {
+        let by_driver = BindingOverride { driver_specializes: true, ..BindingOverride::default() };
+        let [ours, driver] = [BindingOverride::default(), by_driver].map(|o| bits(&film(name, &settings(), o, 0..16)));
+        assert_eq!(ours, driver, "{name}");
     }
 }
 

@@ -91,7 +91,7 @@ fn without_boolean_constants(spirv: &[u32]) -> Vec<u32> {
 /// Reflects the blocks of the path-tracing kernel, compiled without optimisation so that all members keep their names.
 fn reflect() -> Blocks {
     let defines = [("TRACE_BACKEND", "0".to_owned()), ("ARRAY_FORM", "0".to_owned())];
-    let spirv = shader_compiler::compile(gpu::sources(), "path_trace.comp", &defines, false).expect("it compiles");
+    let spirv = shader_compiler::compile(gpu::sources(), "path_trace.comp", &defines).expect("it compiles");
     let entries = ReflectConfig::new()
         .spv(without_boolean_constants(&spirv))
         .ref_all_rscs(true)

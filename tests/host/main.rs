@@ -22,4 +22,5 @@ mod scene_bad_input;
 mod scene_gltf;
 mod scene_obj;
 mod scene_support;
+mod specialize;
 mod statistics;
