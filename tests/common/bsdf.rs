@@ -8,6 +8,7 @@ use sunfleck::scene::{Bsdf, Volume};
 
 use super::ggx_albedo::{self, Albedo};
 use super::kernel::{TestKernel, floats, texel, vector, vector_texel};
+use super::microfacets::{ggx_distribution, smith_lambda};
 use super::scenes::scene;
 
 /// Flags of a sample, as in shaders/include/bsdf.glsl.
@@ -152,16 +153,6 @@ pub fn evaluate(kernel: &TestKernel, configurations: &[Configuration], at: &[(us
 
 pub fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
-}
-
-/// GGX for roughness along x and z.
-pub fn ggx_distribution(h: DVec3, [x, z]: [f64; 2]) -> f64 {
-    1.0 / (PI * x * z * ((h.x / x).powi(2) + (h.z / z).powi(2) + h.y * h.y).powi(2))
-}
-
-/// Smith's Λ of GGX.
-pub fn smith_lambda(w: DVec3, [x, z]: [f64; 2]) -> f64 {
-    0.5 * ((1.0 + ((x * w.x).powi(2) + (z * w.z).powi(2)) / (w.y * w.y)).sqrt() - 1.0)
 }
 
 /// `bsdf_kernel` for `evaluate`.

@@ -8,33 +8,20 @@ use glam::DVec3;
 use sunfleck::layout::DIELECTRIC_ALBEDO_SIZE;
 
 use super::ggx_albedo::direction;
+use super::microfacets::{VisibleNormalDisk, fresnel, refracted_cosine, smith_lambda};
 
 /// The table's range of |η − 1|/(η + 1), as in shaders/include/bsdf_dielectric.glsl.
 const CONTRASTS: [f64; 2] = [0.005, 0.98];
-
-/// Unpolarised reflectance for a cosine and the refracted one (PBR, 4th ed., eq. 9.12).
-pub fn fresnel(cosine: f64, transmitted: f64, eta: f64) -> f64 {
-    let parallel = (eta * cosine - transmitted) / (eta * cosine + transmitted);
-    let perpendicular = (cosine - eta * transmitted) / (cosine + eta * transmitted);
-    0.5 * (parallel * parallel + perpendicular * perpendicular)
-}
-
-/// The refracted cosine; none where reflection is total.
-pub fn refracted_cosine(cosine: f64, eta: f64) -> Option<f64> {
-    let squared = (eta - 1.0) * (eta + 1.0) + cosine * cosine;
-    (squared > 0.0).then(|| squared.sqrt() / eta)
-}
 
 /// ∫ f·|cos| over the sphere, flux for refracted radiance, and the same where nothing is reflected that can be refracted.
 /// `wo` has no z; masking and shadowing are height-correlated, (1 + Λ(wo) + Λ(wi))⁻¹ on both sides (PBR §9.7.3).
 /// `rule` is Gauss and Legendre's in [0, 1].
 pub fn albedo(wo: DVec3, alpha: f64, eta: f64, rule: &[(f64, f64)]) -> [f64; 2] {
     let order = rule.len();
-    let lambda = |w: DVec3| 0.5 * ((1.0 + alpha * alpha * (w.x * w.x + w.z * w.z) / (w.y * w.y)).sqrt() - 1.0);
-    let lambda_o = lambda(wo);
-    let masked = |wi: DVec3| (1.0 + lambda_o) / (1.0 + lambda_o + lambda(wi));
-    let stretched = DVec3::new(alpha * wo.x, wo.y, 0.0).normalize();
-    let across = DVec3::new(-stretched.y, stretched.x, 0.0);
+    let alpha = [alpha; 2];
+    let lambda_o = smith_lambda(wo, alpha);
+    let masked = |wi: DVec3| (1.0 + lambda_o) / (1.0 + lambda_o + smith_lambda(wi, alpha));
+    let disk = VisibleNormalDisk::new(wo, alpha);
     let mut sums = [0.0; 2];
     for (x, radial_weight) in rule {
         let (sine, cosine) = (x * FRAC_PI_2).sin_cos();
@@ -42,11 +29,7 @@ pub fn albedo(wo: DVec3, alpha: f64, eta: f64, rule: &[(f64, f64)]) -> [f64; 2] 
         let weight = radial_weight * PI * sine * cosine / order as f64;
         for k in 0..order {
             let (a, b) = ((k as f64 + 0.5) * PI / order as f64 - FRAC_PI_2).sin_cos();
-            let (a, b) = (sine * b, sine * a);
-            let s = 0.5 * (1.0 + stretched.y);
-            let b = (1.0 - s) * (1.0 - a * a).max(0.0).sqrt() + s * b;
-            let h = DVec3::Z * a + across * b + stretched * (1.0 - a * a - b * b).max(0.0).sqrt();
-            let h = DVec3::new(alpha * h.x, h.y.max(0.0), alpha * h.z).normalize();
+            let h = disk.normal(sine * b, sine * a);
             let cosine = wo.dot(h);
             let reflected = h * (2.0 * cosine) - wo;
             let up = if reflected.y > 0.0 { masked(reflected) } else { 0.0 };

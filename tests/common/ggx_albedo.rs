@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 use sunfleck::layout::{GGX_ALBEDO_SIZE, GGX_ANISOTROPIC_SIZES};
 
 use super::half_vector_bins::gauss_legendre;
+use super::microfacets::{VisibleNormalDisk, smith_lambda};
 
 /// Albedo of the single-scattering lobe towards a direction.
 #[derive(Clone, Copy, Debug)]
@@ -22,13 +23,8 @@ pub struct Albedo {
 /// masking and shadowing (Heitz 2014, eq. 99). Visible normals are parametrised as in Heitz 2018; the disk's radius as a
 /// sine, so that nodes lie dense where normals are nearly horizontal.
 pub fn albedo(wo: DVec3, alpha: [f64; 2], order: usize) -> Albedo {
-    let [ax, az] = alpha;
-    let lambda = |w: DVec3| 0.5 * ((1.0 + ((ax * w.x).powi(2) + (az * w.z).powi(2)) / (w.y * w.y)).sqrt() - 1.0);
-    let stretched = DVec3::new(ax * wo.x, wo.y, az * wo.z).normalize();
-    let horizontal = stretched.x.hypot(stretched.z);
-    let t1 = if horizontal > 0.0 { DVec3::new(-stretched.z, 0.0, stretched.x) / horizontal } else { DVec3::X };
-    let t2 = t1.cross(stretched);
-    let lambda_o = lambda(wo);
+    let lambda_o = smith_lambda(wo, alpha);
+    let disk = VisibleNormalDisk::new(wo, alpha);
     let rule = gauss_legendre(order);
     let mut result = Albedo { white: 0.0, schlick: 0.0 };
     for (x, radial_weight) in &rule {
@@ -37,15 +33,11 @@ pub fn albedo(wo: DVec3, alpha: [f64; 2], order: usize) -> Albedo {
         let weight = radial_weight * PI * sine * cosine;
         for (y, angular_weight) in &rule {
             let (sin_angle, cos_angle) = (2.0 * PI * y).sin_cos();
-            let (a, b) = (sine * cos_angle, sine * sin_angle);
-            let s = 0.5 * (1.0 + stretched.y);
-            let b = (1.0 - s) * (1.0 - a * a).max(0.0).sqrt() + s * b;
-            let h = t1 * a + t2 * b + stretched * (1.0 - a * a - b * b).max(0.0).sqrt();
-            let h = DVec3::new(ax * h.x, h.y.max(0.0), az * h.z).normalize();
+            let h = disk.normal(sine * cos_angle, sine * sin_angle);
             let cosine = wo.dot(h);
             let wi = h * (2.0 * cosine) - wo;
             if wi.y > 0.0 {
-                let share = weight * angular_weight * (1.0 + lambda_o) / (1.0 + lambda_o + lambda(wi));
+                let share = weight * angular_weight * (1.0 + lambda_o) / (1.0 + lambda_o + smith_lambda(wi, alpha));
                 result.white += share;
                 result.schlick += share * (1.0 - cosine).powi(5);
             }
@@ -73,20 +65,17 @@ pub fn anisotropic_entry([x, azimuth, ratio, y]: [f64; 4], order: usize) -> [i16
     let larger = (y * y).max(SMALLEST_ALPHA);
     let alpha = [larger, (larger * ratio * ratio).max(SMALLEST_ALPHA)];
     let at = |x: f64| numbers(direction(x, stretched_azimuth(azimuth, alpha), alpha), alpha, order);
-    let [white, offset] = at(x);
-    let offset = if x == 1.0 { at(NEAR_THE_NORMAL)[1] } else { offset };
     let narrow = (1.0 - 10.0 * larger).max(0.0);
+    let [white, offset] = at(x);
+    let offset = if x == 1.0 { at(0.981 + 0.004 * narrow)[1] } else { offset };
     // Towards the horizon it grows faster than the table's coordinate tells.
     let horizon = (1.0 - 10.0 * x).max(0.0);
-    let lowered = offset * (1.0 - horizon * (0.005 + 0.04 * narrow)) - 0.005 - 0.006 * narrow;
+    let lowered = offset * (1.0 - horizon * (0.005 + 0.036 * narrow)) - 0.005 - 0.006 * narrow;
     [white * 1.0032 / UNITS[0], lowered / UNITS[1]].map(|number| {
         assert!(number.abs() <= 1.0, "{number} cannot be stored");
         (number * SNORM).round() as i16
     })
 }
-
-/// The polar coordinate whose offset stands for the normal's.
-const NEAR_THE_NORMAL: f64 = 0.985;
 
 /// What a stored number is divided by.
 const SNORM: f64 = 32767.0;

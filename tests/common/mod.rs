@@ -11,6 +11,7 @@ pub mod gpu;
 pub mod half_vector_bins;
 pub mod irradiance;
 pub mod kernel;
+pub mod microfacets;
 pub mod mitsuba_bsdfs;
 pub mod mutation;
 pub mod random;

@@ -6,10 +6,11 @@ use std::f64::consts::PI;
 
 use crate::common::bsdf::{
     Configuration, SCATTERED_DELTA, SCATTERED_THROUGH, Sample, Value, bsdf_kernel, direction, evaluate,
-    evaluating_kernel, ggx_distribution, luminance, scatter, smith_lambda,
+    evaluating_kernel, luminance, scatter,
 };
-use crate::common::dielectric_albedo::{Table, fresnel, refracted_cosine};
+use crate::common::dielectric_albedo::Table;
 use crate::common::kernel::TestKernel;
+use crate::common::microfacets::{fresnel, ggx_distribution, refracted_cosine, smith_lambda};
 use crate::common::statistics::{chi_square_test, sidak};
 use glam::DVec3;
 

@@ -6,10 +6,11 @@
 //! - the Fresnel term of dielectric lobes: Schlick's here, the exact one there;
 //! - visible normals: the bounded ones here, all there.
 
-use crate::common::bsdf::{Configuration, MetallicRoughness, Value, evaluate, evaluating_kernel, smith_lambda};
+use crate::common::bsdf::{Configuration, MetallicRoughness, Value, evaluate, evaluating_kernel};
 use crate::common::dielectric_albedo::Table;
 use crate::common::gpu;
 use crate::common::kernel::{floats, texel};
+use crate::common::microfacets::{fresnel, refracted_cosine, smith_lambda};
 use crate::common::mitsuba_bsdfs::{Case, Continuous, Smooth, table};
 use glam::DVec3;
 use sunfleck::layout::{BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS};
@@ -39,14 +40,6 @@ fn new(case: &Case<Continuous>, wo: DVec3) -> Configuration {
     Configuration::new(BSDF_METALLIC_ROUGHNESS, case.color, wo)
 }
 
-/// Unpolarised dielectric reflectance (Born and Wolf, §1.5.2).
-fn fresnel(cosine: f64, eta: f64) -> f64 {
-    let transmitted = (1.0 - (1.0 - cosine * cosine) / (eta * eta)).sqrt();
-    let s = (cosine - eta * transmitted) / (cosine + eta * transmitted);
-    let p = (transmitted - eta * cosine) / (transmitted + eta * cosine);
-    0.5 * (s * s + p * p)
-}
-
 /// The known factors by which Mitsuba's f is the shader's f, and the same of the pdf; and what each difference is.
 struct Factors {
     /// Separate over correlated heights.
@@ -70,7 +63,8 @@ fn factors(c: &Configuration, plugin: &str, row: &Continuous) -> Factors {
     let model = MetallicRoughness::new(c, row.wo);
     let cosine = row.wo.dot((row.wo + up).normalize());
     let color = DVec3::from(c.color.map(f64::from));
-    let exact = fresnel(cosine, c.ior.into());
+    let ior = f64::from(c.ior);
+    let exact = refracted_cosine(cosine, ior).map_or(1.0, |transmitted| fresnel(cosine, transmitted, ior));
     let f0 = ((f64::from(c.ior) - 1.0) / (f64::from(c.ior) + 1.0)).powi(2);
     let (energy, fresnel) = match plugin {
         "roughdielectric" => {

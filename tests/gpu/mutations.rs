@@ -140,7 +140,7 @@ mutations! {
         caught by "anisotropy::the_texture_gives_direction_and_strength";
     /// The albedo of a surface whose grooves run the other way.
     albedo_of_other_grooves: "include/ggx.glsl",
-        "if (alpha.x < alpha.y) horizontal" => "if (alpha.x > alpha.y) horizontal",
+        "alpha.x < alpha.y ? wo.zx : wo.xz" => "alpha.x > alpha.y ? wo.zx : wo.xz",
         caught by "bsdf_chi_square::anisotropic_lobes_give_back_what_they_get";
     /// A cone of two pixels.
     wide_cone: "include/ray_cone.glsl",

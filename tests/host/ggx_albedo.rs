@@ -96,7 +96,7 @@ fn the_anisotropic_table_is_good_between_its_nodes() {
                 (alpha, cosine, azimuth)
             })
             .collect();
-        let errors: Vec<[f64; 2]> = points
+        let errors: Vec<[f64; 3]> = points
             .into_par_iter()
             .map(|(alpha, cosine, azimuth)| {
                 let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
@@ -104,14 +104,16 @@ fn the_anisotropic_table_is_good_between_its_nodes() {
                 let (exact, stored) = (albedo(wo, alpha, 80), stored(wo, alpha));
                 // What comes back from a white metal is the true albedo over the stored one.
                 let metal = exact.white / stored.white - 1.0;
-                // A white dielectric's base gets what the stored albedo of its lobe leaves.
+                // A white dielectric's base gets what the stored albedo of its lobe leaves; one that transmits spreads it
+                // by the same microfacets.
                 let f0 = 0.04;
                 let lobe = |a: Albedo| f0 * (a.white - a.schlick) + a.schlick;
-                let dielectric = (lobe(exact) - lobe(stored)) * (1.0 + f0 * (1.0 - stored.white) / stored.white);
-                [metal, dielectric]
+                let factor = 1.0 + f0 * (1.0 - stored.white) / stored.white;
+                let (reflected, left) = (lobe(exact) * factor, 1.0 - lobe(stored) * factor);
+                [metal, reflected + left - 1.0, reflected + left * exact.white / stored.white - 1.0]
             })
             .collect();
-        for (k, what) in ["metal", "dielectric"].into_iter().enumerate() {
+        for (k, what) in ["metal", "dielectric", "thin dielectric"].into_iter().enumerate() {
             let limits = errors.iter().fold([0.0_f64; 2], |[low, high], e| [low.min(e[k]), high.max(e[k])]);
             let [low, high] = ratios else { unreachable!("pairs") };
             println!("ratio {low} to {high}, {what}: 1 {:+.2e} to 1 {:+.2e} come back", limits[0], limits[1]);
