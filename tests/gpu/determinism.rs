@@ -3,7 +3,7 @@
 use std::ops::{ControlFlow, Range};
 
 use crate::common::gpu;
-use crate::common::scenes::{scene, short_form};
+use crate::common::scenes::{scene, short_form, slow_driver};
 use sunfleck::film::Film;
 use sunfleck::gpu::ArrayForm;
 use sunfleck::render::{BindingOverride, Integrator, PathTracer, Settings};
@@ -67,6 +67,10 @@ fn the_form_of_the_arrays_and_their_chunks_do_not_change_a_bit() {
 /// Specialisation before the driver does what the driver's does, with every kind of material and light at least once.
 #[test]
 fn who_specializes_does_not_change_a_bit() {
+    if slow_driver() {
+        eprintln!("not run: SwiftShader compiles dead code too, which takes it minutes");
+        return;
+    }
     for name in some(&["textured", "cornell_spheres", "volumes", "environment", "punctual"]) {
         let by_driver = BindingOverride { driver_specializes: true, ..BindingOverride::default() };
         let [ours, driver] = [BindingOverride::default(), by_driver].map(|o| bits(&film(name, &settings(), o, 0..16)));
