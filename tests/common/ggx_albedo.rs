@@ -71,7 +71,7 @@ pub fn anisotropic_entry([x, azimuth, ratio, y]: [f64; 4], order: usize) -> [i16
     // Towards the horizon it grows faster than the table's coordinate tells.
     let horizon = (1.0 - 10.0 * x).max(0.0);
     let lowered = offset * (1.0 - horizon * (0.005 + 0.036 * narrow)) - 0.005 - 0.006 * narrow;
-    [white * 1.0032 / UNITS[0], lowered / UNITS[1]].map(|number| {
+    [white * 1.0029 / UNITS[0], lowered / UNITS[1]].map(|number| {
         assert!(number.abs() <= 1.0, "{number} cannot be stored");
         (number * SNORM).round() as i16
     })
