@@ -10,7 +10,8 @@
 // numbers of its own.
 uvec2 alpha_key(SampleKey key, uint bounce, bool shadow) {
     if (!HAS_ALPHA) return uvec2(0u);
-    uvec4 bits = sample_bits(key, bounce, DIMENSIONS_ALPHA);
+    // These are keys of hashes, which gain nothing by being stratified.
+    uvec4 bits = hashed_bits(key, bounce, DIMENSIONS_ALPHA);
     return shadow ? bits.zw : bits.xy;
 }
 

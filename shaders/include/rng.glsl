@@ -2,6 +2,8 @@
 // whatever a scene uses or a kernel drops.
 #ifndef RNG_GLSL
 #define RNG_GLSL
+#include "features.glsl"
+#include "sobol.glsl"
 
 // Groups of four dimensions. Camera groups stand at bounce 0; the others at the number of the scattering event.
 const uint DIMENSIONS_FILM = 0u;     // x, y in the pixel; lens u, v
@@ -38,9 +40,36 @@ uvec4 pcg4d(uvec4 v) {
     return v;
 }
 
+// Four 32-bit values of a group of dimensions at a bounce, all independent.
+uvec4 hashed_bits(SampleKey key, uint bounce, uint group) {
+    return pcg4d(uvec4(key.pixel, key.index, bounce * DIMENSION_GROUPS + group, key.seed));
+}
+
+// The same as two Sobol' pairs, each in an order of its own (padding: PBR, 4th ed., §8.6.3). What belongs together is a
+// pair: of scattering and of lights the two in the middle, and the two around them.
+uvec4 sobol_bits(SampleKey key, uint bounce, uint group) {
+    uint x = key.pixel & 0xffffu;
+    uint y = key.pixel >> 16u;
+    uint replicate = 0u;
+    if (SAMPLER == SAMPLER_SOBOL_REPLICATES) {
+        // Those of src/film/replicates.rs: each a point set of its own.
+        uint block = key.index / SOBOL_BLOCK;
+        replicate = 1u + block % SOBOL_REPLICATES;
+        key.index = block / SOBOL_REPLICATES * SOBOL_BLOCK + key.index % SOBOL_BLOCK;
+    }
+    uint tile = x >> SOBOL_TILE | y >> SOBOL_TILE << 16u;
+    uint z = morton(x & ((1u << SOBOL_TILE) - 1u), y & ((1u << SOBOL_TILE) - 1u));
+    uvec4 a = pcg4d(uvec4(tile, replicate, bounce * DIMENSION_GROUPS + group, key.seed));
+    uvec4 b = pcg4d(a);
+    uvec2 first = sobol_pair(key.index, z, a);
+    uvec2 second = sobol_pair(key.index, z, b);
+    if (group == DIMENSIONS_SCATTER || group == DIMENSIONS_LIGHT) return uvec4(second.x, first, second.y);
+    return uvec4(first, second);
+}
+
 // Four 32-bit values of a group of dimensions at a bounce.
 uvec4 sample_bits(SampleKey key, uint bounce, uint group) {
-    return pcg4d(uvec4(key.pixel, key.index, bounce * DIMENSION_GROUPS + group, key.seed));
+    return SAMPLER == SAMPLER_INDEPENDENT ? hashed_bits(key, bounce, group) : sobol_bits(key, bounce, group);
 }
 
 // [0, 1), in steps of 2^-24.

@@ -10,6 +10,7 @@ use crate::film::RELATIVE_ERROR_EPSILON;
 use crate::film::exr::{VARIANCE_CHANNEL, read_exr};
 use crate::film::metrics::{compare, flip};
 use crate::film::tonemap::ToneMap;
+use crate::render::SamplerKind;
 use crate::{Error, Result};
 
 /// A reference image.
@@ -82,11 +83,19 @@ impl Reference {
             );
             return Err(Error::input(path, message));
         }
-        let image = MeanImage::from_exr(&file).ok_or_else(|| Error::input(path, "has no channels R, G, B"))?;
+        let mut image = MeanImage::from_exr(&file).ok_or_else(|| Error::input(path, "has no channels R, G, B"))?;
         if !(0..image.mean.len()).any(|pixel| image.is_finite(pixel)) {
             return Err(Error::input(path, "has no finite pixel"));
         }
-        let noise = if file.values(VARIANCE_CHANNEL).is_some() {
+        let key = file.metadata.kernel_key.as_deref().unwrap_or_default();
+        // Sobol' points: the layer is an upper bound, which must not be subtracted.
+        let bound = key.split(' ').any(|word| word.starts_with(SamplerKind::Sobol.name()));
+        if bound {
+            image.variance.fill([0.0; 3]);
+        }
+        let noise = if bound {
+            "its samples are those of the Sobol' sampler: it is taken as exact, and nothing is subtracted"
+        } else if file.values(VARIANCE_CHANNEL).is_some() {
             "variance from the file's own layer, taken as grey in proportion to each pixel, and subtracted"
         } else {
             "the file has no variance layer: it is taken as exact, and nothing is subtracted"

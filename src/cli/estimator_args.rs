@@ -22,7 +22,8 @@ pub(crate) struct EstimatorArgs {
     /// Which part of the light to add up; emission + direct + indirect = path.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<Integrator>(Integrator::NAMES), help_heading = "Light transport")]
     integrator: Integrator,
-    /// Where the random numbers come from.
+    /// Where the random numbers come from: Owen-scrambled Sobol' points, with far less noise a sample, most so at powers
+    /// of two of samples; or independent numbers.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<SamplerKind>(SamplerKind::NAMES), help_heading = "Light transport")]
     pub(super) sampler: SamplerKind,
     /// How light is looked for: mis takes two samples, mixture one of the averaged pdf, nee and bsdf one strategy.

@@ -1,7 +1,7 @@
 //! What the contract of the command line names and this version does not have yet. Building something means deleting
 //! its line here.
 
-use sunfleck::render::{DeviceChoice, PixelFilter, SamplerKind};
+use sunfleck::render::{DeviceChoice, PixelFilter};
 
 use super::Command;
 use super::bench::BenchArgs;
@@ -17,7 +17,6 @@ const NOT_BUILT: &[Entry] = &[
     ("--denoise", |c| render(c, |r| r.denoise)),
     ("--checkpoint", |c| render(c, |r| r.checkpoint.is_some())),
     ("--resume", |c| render(c, |r| r.resume)),
-    ("--sampler sobol", |c| estimator(c, |e| e.sampler == SamplerKind::Sobol)),
     ("--filter tent", |c| render(c, |r| r.filter == PixelFilter::Tent)),
     ("--filter gaussian", |c| render(c, |r| r.filter == PixelFilter::Gaussian)),
     ("--filter blackman-harris", |c| render(c, |r| r.filter == PixelFilter::BlackmanHarris)),

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use sunfleck::film::replicates::CONFIDENCE;
-use sunfleck::render::{RenderResult, StopReason};
+use sunfleck::render::{RenderResult, SamplerKind, StopReason};
 use sunfleck::scene::Scene;
 
 use super::progress::{time, with_prefix};
@@ -38,6 +38,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "rays_per_second": rate(result.rays),
         "paths_per_second": rate(result.paths),
         "estimated_error": estimated_error(result),
+        "estimated_error_is_upper_bound": is_upper_bound(job, result),
         "estimated_error_interval": result.error_estimate.map(|e| e.interval),
         "estimated_error_confidence": result.error_estimate.map(|_| CONFIDENCE),
         "estimated_error_replicates": result.error_estimate.map(|e| e.replicates),
@@ -51,13 +52,22 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
     })
 }
 
-/// From the replicates where they were asked for, else from the variance of the samples.
+/// From the replicates where they were asked for, else from the variance of the samples: see [`is_upper_bound`].
 fn estimated_error(result: &RenderResult) -> Option<f64> {
     result.error_estimate.map(|estimate| estimate.error).or_else(|| result.film.estimated_error())
 }
 
-fn print_error(result: &RenderResult) {
+/// Samples that are not independent of each other have a mean whose variance is less than theirs over their number.
+fn is_upper_bound(job: &RenderJob, result: &RenderResult) -> bool {
+    result.error_estimate.is_none() && job.settings.sampler != SamplerKind::Independent
+}
+
+fn print_error(job: &RenderJob, result: &RenderResult) {
     let Some(error) = estimated_error(result) else { return };
+    if is_upper_bound(job, result) {
+        eprintln!("  relative error below {:.3} %, an upper bound; --estimate estimates it", 100.0 * error);
+        return;
+    }
     eprint!("  estimated relative error {:.3} %", 100.0 * error);
     if let Some(estimate) = result.error_estimate {
         let [low, high] = estimate.interval.map(|bound| 100.0 * bound);
@@ -86,7 +96,7 @@ pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
     let seconds = result.seconds.render.max(1e-9);
     let rate = |count: u64| with_prefix(count as f64 / seconds);
     eprintln!("  {}paths/s, {}rays/s", rate(result.paths), rate(result.rays));
-    print_error(result);
+    print_error(job, result);
     if result.non_finite_samples > 0 {
         eprintln!("warning: {} samples were NaN or infinite; each is a bug:", result.non_finite_samples);
         for s in &result.first_non_finite {

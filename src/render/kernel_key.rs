@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, Settings};
+use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings};
 use crate::gpu::{ArrayForm, TraceBackend};
 use crate::prepare::{EnvironmentKind, Features, Prepared};
 use crate::scene::{Camera, Projection};
@@ -33,6 +33,10 @@ pub struct KernelKey {
     pub light_sampling: LightSampling,
     /// How two samples are weighed.
     pub mis_heuristic: MisHeuristic,
+    /// Where the random numbers come from.
+    pub sampler: SamplerKind,
+    /// Its points are those of independent replicates, by which the error is estimated.
+    pub replicates: bool,
     /// How environment directions are drawn.
     pub env_sampling: EnvironmentSampling,
 }
@@ -58,6 +62,8 @@ impl KernelKey {
             integrator: settings.integrator,
             light_sampling: settings.light_sampling,
             mis_heuristic: settings.mis_heuristic,
+            sampler: settings.sampler,
+            replicates: settings.sampler == SamplerKind::Sobol && settings.estimates_error(),
             env_sampling: settings.env_sampling,
         }
     }
@@ -100,6 +106,7 @@ impl KernelKey {
             (7, self.mis_heuristic as u32),
             (8, self.env_sampling as u32),
             (9, self.stack_size),
+            (10, self.sampler as u32 + u32::from(self.replicates)),
         ]
     }
 }
@@ -113,6 +120,9 @@ impl fmt::Display for KernelKey {
         )?;
         write!(f, " {} {} {} {}", self.integrator, self.light_sampling, self.mis_heuristic, self.env_sampling)?;
         write!(f, " [{}]", self.features.kept().join(" "))?;
+        if self.sampler != SamplerKind::Independent {
+            write!(f, " {}{}", self.sampler, if self.replicates { ":replicates" } else { "" })?;
+        }
         if self.lens {
             f.write_str(" lens")?;
         }

@@ -12,7 +12,7 @@ use super::looks::Looks;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
-use super::{Integrator, ProgressUpdate, Run, RunPlan, Settings, StopReason};
+use super::{Integrator, ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
 use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
@@ -132,13 +132,18 @@ impl PathTracer {
     /// Renders what the plan says. The image of a run that ends at an error is, bit for bit, that of the same range.
     ///
     /// # Errors
-    /// When the device is lost.
+    /// When the device is lost, or the plan asks for an error that the tracer's samples cannot give: those of the Sobol'
+    /// sampler are replicates only if its settings had asked for the error too.
     pub fn run_plan(
         &mut self,
         seed: u32,
         plan: &RunPlan,
         progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
     ) -> Result<Run> {
+        let estimates = plan.estimate || plan.target_error.is_some();
+        if estimates && self.key.sampler != SamplerKind::Independent && !self.key.replicates {
+            return Err(Error::Usage(String::from("the path tracer was not built to estimate its error")));
+        }
         self.constants.seed = seed;
         let looks = Looks::new(plan.samples.clone(), plan.target_error);
         let mut sizes = SliceSizes::new(self.overrides, self.slices[0].lanes());

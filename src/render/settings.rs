@@ -93,6 +93,11 @@ impl Settings {
         self.sample_range.clone().unwrap_or(0..self.spp)
     }
 
+    /// Whether the error is estimated from replicates.
+    pub fn estimates_error(&self) -> bool {
+        self.estimate || self.target_error.is_some()
+    }
+
     /// The sample indices that a film rendered with these settings holds: a run that ended early has the first ones,
     /// and its pixels may differ in how many.
     pub fn samples_in(&self, film: &Film) -> Range<u32> {
@@ -147,9 +152,9 @@ named_enum! {
     /// Where the random numbers come from.
     SamplerKind, "sampler" {
         /// Independent uniform numbers, hashed from pixel, sample and dimension.
-        #[default]
         Independent = "independent",
-        /// Owen-scrambled Sobol' points.
+        /// Owen-scrambled Sobol' points, in which neighbouring pixels complete each other.
+        #[default]
         Sobol = "sobol",
     }
 }

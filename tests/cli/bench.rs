@@ -220,7 +220,19 @@ fn compare_says_that_mis_beats_bsdf_sampling() {
 fn compare_takes_another_program() {
     let folder = tempfile::tempdir().unwrap();
     let program = assert_cmd::cargo::cargo_bin!("sunfleck").display().to_string();
-    let arguments = ["--spp", "4..4", "--seeds", "2", "--resolution", "8x8", "--json", "--compare", &program];
+    let arguments = [
+        "--spp",
+        "4..4",
+        "--seeds",
+        "2",
+        "--resolution",
+        "8x8",
+        "--json",
+        "--reference-spp",
+        "256",
+        "--compare",
+        &program,
+    ];
     let (code, report, stderr) = bench(folder.path(), &arguments);
     assert_eq!(code, 0, "{stderr}");
     // The same build with the same seeds renders the same bits.
@@ -274,7 +286,7 @@ fn wrong_input_is_refused_by_name() {
     std::fs::write(folder.path().join("bad.json"), r#"{"about": "", "benches": [{"nam": 1}]}"#).unwrap();
     let flag = r#"{"about": "", "benches": [{"name": "a", "scene": "cornell", "flags": ["--sp"]}]}"#;
     std::fs::write(folder.path().join("flag.json"), flag).unwrap();
-    for (name, flag) in [("json", "--json"), ("sobol", "--sampler=sobol")] {
+    for (name, flag) in [("json", "--json"), ("devices", "--device=all")] {
         let text = format!(r#"{{"about": "", "benches": [{{"name": "a", "scene": "cornell", "flags": ["{flag}"]}}]}}"#);
         std::fs::write(folder.path().join(format!("{name}.json")), text).unwrap();
     }
@@ -298,7 +310,7 @@ fn wrong_input_is_refused_by_name() {
         (&["bad.json", "--camera", "0"], 2, "--camera is for one scene"),
         (&["bad.json", "--reference", "no.exr"], 2, "--reference is for one scene"),
         (&["json.json"], 3, "bench 'a': --json is for the command line"),
-        (&["sobol.json"], 2, "--sampler sobol is not built yet"),
+        (&["devices.json"], 2, "--device all is not built yet"),
         (&["no-such-scene.gltf"], 3, "no-such-scene.gltf"),
         (&["--reference", "no-such.exr", "--resolution", "8x8"], 3, "no-such.exr"),
         (&["--reference", "no.exr", "--resolution", "8x8"], 3, "no.exr"),

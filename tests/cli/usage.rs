@@ -83,13 +83,11 @@ fn impossible_combinations_are_usage_errors() {
 fn what_is_not_built_is_refused_by_name() {
     for (arguments, name) in [
         (&["watch", "cornell"] as &[&str], "watch"),
-        (&["bench", "--sampler", "sobol"], "--sampler sobol"),
         (&["bench", "--device", "all"], "--device all"),
         (&["render", "--aov", "albedo,normal"], "--aov"),
         (&["render", "--denoise"], "--denoise"),
         (&["render", "--checkpoint", "c"], "--checkpoint"),
         (&["render", "--resume"], "--resume"),
-        (&["render", "--sampler", "sobol"], "--sampler sobol"),
         (&["render", "--filter", "gaussian"], "--filter gaussian"),
         (&["render", "--device", "all"], "--device all"),
     ] {

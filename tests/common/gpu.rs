@@ -13,7 +13,7 @@ use sunfleck::gpu::{Gpu, TraceBackend, take_validation_messages, validation_is_a
 use sunfleck::layout::RenderConstants;
 use sunfleck::prepare::{Prepared, camera_constants};
 use sunfleck::render::{
-    BindingOverride, FunctionCall, PathTracer, Run, Settings, TraceChoice, open_device, prepare_scene,
+    BindingOverride, FunctionCall, PathTracer, Run, SamplerKind, Settings, TraceChoice, open_device, prepare_scene,
 };
 use sunfleck::scene::{Scene, builtin};
 
@@ -53,9 +53,10 @@ fn shaders_dir() -> Option<PathBuf> {
     std::env::var_os(SHADERS_VARIABLE).map(PathBuf::from)
 }
 
-/// Small default settings for tests.
+/// Small default settings for tests, with independent samples: most tests take the variance of a mean from them.
 pub fn settings(width: u32, height: u32) -> Settings {
-    Settings { width, height, shaders_dir: shaders_dir(), ..Settings::default() }
+    let sampler = SamplerKind::Independent;
+    Settings { width, height, sampler, shaders_dir: shaders_dir(), ..Settings::default() }
 }
 
 /// A scene on the device under test.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::scenes::{all_scenes, scene, short_form};
 use crate::common::statistics::Estimate;
 use crate::common::{gpu, scenes};
-use sunfleck::render::{EnvironmentSampling, LightSampling, MisHeuristic, Settings};
+use sunfleck::render::{EnvironmentSampling, LightSampling, MisHeuristic, SamplerKind, Settings};
 use sunfleck::scene::{Environment, Scene};
 
 /// Small films: these tests compare means of images.
@@ -67,6 +67,22 @@ fn balance_and_power_heuristics_agree() {
     let power = settings();
     let balance = Settings { mis_heuristic: MisHeuristic::Balance, ..power.clone() };
     assert_agree("power and balance", mean(&scene, &power), mean(&scene, &balance));
+}
+
+/// The Sobol' sampler has the mean of independent samples, and is by far the nearer to it.
+#[test]
+fn samplers_agree() {
+    for name in ["cornell", "metallic_roughness", "environment", "volumes", "many_lights"] {
+        if short_form() && name != "cornell" {
+            continue;
+        }
+        let scene = scene(name);
+        let independent = Settings { max_bounces: Some(6), ..settings() };
+        for estimate in [false, true] {
+            let sobol = Settings { sampler: SamplerKind::Sobol, estimate, ..independent.clone() };
+            assert_agree(&format!("{name}, independent and sobol"), mean(&scene, &independent), mean(&scene, &sobol));
+        }
+    }
 }
 
 /// A dim sky with a small sun, off the texel grid's symmetries.

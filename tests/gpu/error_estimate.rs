@@ -8,7 +8,7 @@ use crate::common::scenes::{scene, short_form};
 use crate::common::statistics::binomial_at_least;
 use sunfleck::film::replicates::{CONFIDENCE, ErrorEstimate};
 use sunfleck::film::{Film, RELATIVE_ERROR_EPSILON, luminance};
-use sunfleck::render::{PathTracer, RunPlan, StopReason};
+use sunfleck::render::{PathTracer, RunPlan, SamplerKind, Settings, StopReason};
 
 /// What one seed gave.
 struct Image {
@@ -66,8 +66,13 @@ fn true_errors(images: &[Image]) -> Vec<f64> {
     images.iter().map(error).collect()
 }
 
-fn images(name: &str, seeds: u32, samples: u32) -> Vec<Image> {
-    let mut tracer = gpu::path_tracer(&scene(name), &gpu::settings(24, 24));
+fn tracer(name: &str, size: u32, sampler: SamplerKind) -> PathTracer {
+    let settings = Settings { sampler, estimate: true, ..gpu::settings(size, size) };
+    gpu::path_tracer(&scene(name), &settings)
+}
+
+fn images(name: &str, seeds: u32, samples: u32, sampler: SamplerKind) -> Vec<Image> {
+    let mut tracer = tracer(name, 24, sampler);
     (0..seeds).map(|seed| render(&mut tracer, seed, &plan(samples, None)).0).collect()
 }
 
@@ -88,17 +93,19 @@ fn intervals_hold_the_true_error_as_often_as_they_say() {
         return;
     }
     // Two kinds of scene: every pixel well known, and fireflies from lamps that few paths find.
-    for (name, samples) in [("cornell", 128), ("many_lights", 64)] {
+    let scenes = [("cornell", 128), ("many_lights", 64)];
+    let samplers = [SamplerKind::Independent, SamplerKind::Sobol];
+    for ((name, samples), sampler) in samplers.into_iter().flat_map(|s| scenes.map(|scene| (scene, s))) {
         let seeds = 100;
-        let images = images(name, seeds, samples);
+        let images = images(name, seeds, samples, sampler);
         let errors = true_errors(&images);
         let count = covered(&images, &errors, 1.0);
         let width =
             images.iter().map(|i| i.estimate.interval[1] / i.estimate.interval[0]).sum::<f64>() / f64::from(seeds);
-        println!("{name} at {samples}: {count} of {seeds} intervals hold the error; they span a factor of {width:.3}");
+        println!("{name}, {sampler}, {samples}: {count} of {seeds} intervals hold the error; they span {width:.3}");
         // P(X ≤ count) for the coverage that is promised: not too seldom.
         let p = 1.0 - binomial_at_least(count + 1, u64::from(seeds), CONFIDENCE);
-        assert!(p > 0.01, "{name} at {samples}: {count} of {seeds}, p = {p}");
+        assert!(p > 0.01, "{name}, {sampler}, {samples}: {count} of {seeds}, p = {p}");
         if name == "cornell" {
             let ratios = errors.iter().zip(&images).map(|(error, image)| error / image.estimate.error);
             let mean_ratio = ratios.sum::<f64>() / f64::from(seeds);
@@ -122,17 +129,23 @@ fn a_run_to_a_target_error_ends_near_it() {
     if short_form() {
         return;
     }
-    let mut tracer = gpu::path_tracer(&scene("cornell"), &gpu::settings(48, 48));
+    for (sampler, targets) in [(SamplerKind::Independent, [0.14, 0.09]), (SamplerKind::Sobol, [0.08, 0.05])] {
+        runs_end_near(&targets, sampler);
+    }
+}
+
+fn runs_end_near(targets: &[f64], sampler: SamplerKind) {
+    let mut tracer = tracer("cornell", 48, sampler);
     let seeds = 10;
     // The reference is of other seeds.
     let reference: Vec<Image> = (seeds..seeds + 8).map(|seed| render(&mut tracer, seed, &plan(512, None)).0).collect();
-    for target in [0.14, 0.09] {
+    for &target in targets {
         for seed in 0..seeds {
             let (image, stopped_by) = render(&mut tracer, seed, &plan(u32::MAX, Some(target)));
             assert_eq!(stopped_by, StopReason::TargetError);
             assert!(image.estimate.error <= target);
             let error = error_against(&image, &reference);
-            println!("target {target}, seed {seed}: {} samples, true error {error:.4}", image.samples);
+            println!("{sampler}, target {target}, seed {seed}: {} samples, true error {error:.4}", image.samples);
             assert!((error / target - 1.0).abs() < 0.2, "target {target}, seed {seed}: {error}");
         }
     }

@@ -27,6 +27,7 @@ mod sampler;
 mod shader_math;
 mod shaders_valid;
 mod shading_normals;
+mod sobol;
 mod specialized_kernels;
 mod texture;
 mod trace;

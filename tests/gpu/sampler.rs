@@ -14,7 +14,7 @@ const PAIR_BINS: usize = 16;
 
 /// A stream of keys that differ in one coordinate alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Along {
+pub(crate) enum Along {
     Samples,
     PixelsInRow,
     PixelsInColumn,
@@ -57,7 +57,7 @@ fn uniform(observed: &[u64]) -> f64 {
 }
 
 /// χ² of one dimension: of its highest byte and of the lowest byte that a number in [0, 1) still holds.
-fn dimension_p_values(values: &[u32]) -> [f64; 2] {
+pub(crate) fn dimension_p_values(values: &[u32]) -> [f64; 2] {
     [24, 8].map(|shift| {
         let mut bins = [0; BINS];
         values.iter().for_each(|v| bins[(v >> shift) as usize % BINS] += 1);
@@ -66,7 +66,7 @@ fn dimension_p_values(values: &[u32]) -> [f64; 2] {
 }
 
 /// χ² of pairs, and the correlation's p-value: r·√n is normal for independent numbers.
-fn pair_p_values(pairs: impl Iterator<Item = (u32, u32)>) -> [f64; 2] {
+pub(crate) fn pair_p_values(pairs: impl Iterator<Item = (u32, u32)>) -> [f64; 2] {
     let mut bins = [0; PAIR_BINS * PAIR_BINS];
     let (mut sum, mut n) = (0.0, 0.0_f64);
     for (a, b) in pairs {
