@@ -63,12 +63,11 @@ float emission_weight(LaneState lane, float light_pdf) {
 }
 
 void add_environment(inout LaneState lane) {
-    vec3 direction = lane.ray.direction;
-    vec3 light = environment_radiance(constants, direction);
+    vec4 light = environment_radiance_and_pdf(constants, lane.ray.direction);
     float pdf = 0.0;
     if (HAS_LIGHT(LIGHT_ENVIRONMENT) && constants.environment_light != NONE && lane.emission_weight != WEIGHT_FULL)
-        pdf = environment_pdf(constants, direction) * light_pick_probability(constants, constants.environment_light);
-    add_radiance(lane, lane.bounce, lane.throughput * light * emission_weight(lane, pdf));
+        pdf = light.w * light_pick_probability(constants, constants.environment_light);
+    add_radiance(lane, lane.bounce, lane.throughput * light.rgb * emission_weight(lane, pdf));
 }
 
 void add_emission(inout LaneState lane, Surface surface, float distance) {

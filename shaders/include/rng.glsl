@@ -10,7 +10,7 @@ const uint DIMENSIONS_FILM = 0u;     // x, y in the pixel; lens u, v
 const uint DIMENSIONS_TIME = 1u;     // time; filter; two in reserve
 const uint DIMENSIONS_SCATTER = 2u;  // lobe; direction u, v; roulette
 const uint DIMENSIONS_LIGHT = 3u;    // which light; position u, v; which strategy (mixture)
-const uint DIMENSIONS_ENVIRONMENT = 4u;  // row; column; position u, v in the texel
+const uint DIMENSIONS_ENVIRONMENT = 4u;  // row; column; position u, v under the texel's tent
 const uint DIMENSIONS_ALPHA = 5u;    // decisions about alpha: key of the path's ray; key of the shadow ray
 const uint DIMENSION_GROUPS = 8u;
 

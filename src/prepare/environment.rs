@@ -1,7 +1,12 @@
 //! The environment's radiance and, for an image, the CDFs by which its texels are picked.
 //!
-//! The array holds the texels as (r, g, b, 0), row by row from the top, then in words the marginal CDF over rows
-//! (`height + 1`) and one conditional CDF a row (`width + 1` each).
+//! The bilinear image is a sum over texels of their radiance times a tent, two texels wide along u and v. The edge rows are
+//! repeated beyond the poles, so their tents are folded there. A texel is picked by what its tent holds, and a point under
+//! the tent: the density of (u, v) is then the interpolated probability.
+//!
+//! The array holds the texels as (r, g, b, p), row by row from the top, p the probability of picking the texel times
+//! width·height/2π² (0 if texels are not picked), then in words the marginal CDF over rows (`height + 1`) and one
+//! conditional CDF a row (`width + 1` each).
 
 use std::f64::consts::{PI, TAU};
 
@@ -90,86 +95,70 @@ fn image(
     if texel_words + cdf_words + 3 > u64::from(u32::MAX) {
         return Err(PrepareError::EnvironmentTooLarge { width, height });
     }
-    let mut array: Vec<Texel> = texels.iter().map(|&[r, g, b]| [r.to_bits(), g.to_bits(), b.to_bits(), 0]).collect();
-    let weights = Weights::new(width, height, texels);
+    let tents = Tents::new(width, height, texels);
     let mut prepared = PreparedEnvironment {
         kind: EnvironmentKind::Image,
+        array: texels.iter().map(|&[r, g, b]| [r.to_bits(), g.to_bits(), b.to_bits(), 0]).collect(),
         width,
         height,
         radiance: [strength; 3],
         rotation_radians,
-        mean_luminance: weights.mean() * f64::from(strength),
+        mean_luminance: tents.mean() * f64::from(strength),
         ..PreparedEnvironment::default()
     };
     if sampling == EnvironmentSampling::Importance {
         prepared.marginal_word = texel_words as u32;
         prepared.conditional_word = prepared.marginal_word + height + 1;
-        array.extend(super::pack_words(&weights.cdf_words()));
+        prepared.array.extend(super::pack_words(&tents.cdf_words()));
+        prepared.store_probabilities();
     }
-    prepared.array = array;
     Ok(prepared)
 }
 
-/// What each texel's cell is worth: the mean over the cell of the luminance that the shader looks up, and its row's
-/// share of the sphere.
-struct Weights {
+/// What the texels' tents hold: luminance times the integral of the tent and sin θ.
+struct Tents<'a> {
     width: usize,
-    cells: Vec<f64>,
-    /// Solid angle of a texel of each row.
-    solid_angles: Vec<f64>,
+    height: usize,
+    texels: &'a [[f32; 3]],
+    /// Luminance times [`tent_sine`], a row's sum.
+    rows: Vec<f64>,
 }
 
-impl Weights {
-    /// The lookup is bilinear between texel centres. Along one axis a texel's tent covers 6/8 of its own cell and 1/8 of
-    /// each neighbour's, so the exact mean over a cell is the filter (1, 6, 1)/8 on both axes, wrapping around in u and
-    /// repeating the edge row in v as the lookup does. A cell that is positive anywhere has a positive weight.
-    fn new(width: u32, height: u32, texels: &[[f32; 3]]) -> Self {
+impl<'a> Tents<'a> {
+    fn new(width: u32, height: u32, texels: &'a [[f32; 3]]) -> Self {
         let (width, height) = (width as usize, height as usize);
-        let filter = |before: f64, own: f64, after: f64| (before + 6.0 * own + after) / 8.0;
-        let mut along_u = vec![0.0; width * height];
-        for (row, out) in texels.chunks_exact(width).zip(along_u.chunks_exact_mut(width)) {
-            for (x, value) in out.iter_mut().enumerate() {
-                let [before, own, after] = [(x + width - 1) % width, x, (x + 1) % width].map(|x| luminance(row[x]));
-                *value = filter(before, own, after);
-            }
-        }
-        let mut cells = vec![0.0; width * height];
-        for (y, out) in cells.chunks_exact_mut(width).enumerate() {
-            let (above, below) = (y.saturating_sub(1) * width, (y + 1).min(height - 1) * width);
-            for (x, value) in out.iter_mut().enumerate() {
-                *value = filter(along_u[above + x], along_u[y * width + x], along_u[below + x]);
-            }
-        }
-        let solid_angles = (0..height).map(|row| TAU / width as f64 * row_height(row, height)).collect();
-        Self { width, cells, solid_angles }
+        let row = |(y, row): (usize, &[[f32; 3]])| row.iter().map(|t| luminance(*t)).sum::<f64>() * tent_sine(y, height);
+        let rows = texels.chunks_exact(width).enumerate().map(row).collect();
+        Self { width, height, texels, rows }
     }
 
-    fn row_sums(&self) -> Vec<f64> {
-        self.cells
-            .chunks_exact(self.width)
-            .zip(&self.solid_angles)
-            .map(|(row, solid_angle)| row.iter().sum::<f64>() * solid_angle)
-            .collect()
-    }
-
+    /// Mean over the sphere of the interpolated luminance: dω = 2π² sin θ du dv.
     fn mean(&self) -> f64 {
-        self.row_sums().iter().sum::<f64>() / (4.0 * PI)
+        self.rows.iter().sum::<f64>() * PI / (2.0 * (self.width * self.height) as f64)
     }
 
     /// The marginal CDF, then the conditional ones.
     fn cdf_words(&self) -> Vec<u32> {
-        let mut words = cdf::build(&self.row_sums());
-        for row in self.cells.chunks_exact(self.width) {
-            words.extend(cdf::build(row));
+        let mut words = cdf::build(&self.rows);
+        words.reserve_exact(self.height * (self.width + 1));
+        let mut weights = Vec::with_capacity(self.width);
+        for row in self.texels.chunks_exact(self.width) {
+            weights.clear();
+            weights.extend(row.iter().map(|t| luminance(*t)));
+            words.extend(cdf::build(&weights));
         }
         words
     }
 }
 
-/// cos θ₀ − cos θ₁ of a row, as a product that does not cancel at the poles.
-fn row_height(row: usize, height: usize) -> f64 {
+/// ∫ tent·sin θ of a row, in rows: with Δ = π/height the angle of one, sin θ·(sin(Δ/2)/(Δ/2))² about its middle θ. What
+/// lies beyond a pole is folded back, where the sine is positive: twice ∫₀^½ (½ − x)·sin(xΔ) dx = (Δ − 2·sin(Δ/2))/Δ².
+pub fn tent_sine(row: usize, height: usize) -> f64 {
     let step = PI / height as f64;
-    2.0 * ((row as f64 + 0.5) * step).sin() * (0.5 * step).sin()
+    let half = 0.5 * step;
+    let poles = usize::from(row == 0) + usize::from(row + 1 == height);
+    let folded = 2.0 * (half - half.sin()) / (step * step);
+    ((row as f64 + 0.5) * step).sin() * (half.sin() / half).powi(2) + poles as f64 * folded
 }
 
 impl PreparedEnvironment {
@@ -177,22 +166,35 @@ impl PreparedEnvironment {
         self.array.as_flattened()
     }
 
-    /// Density in solid angle of picking `direction` (unit, world space) by the CDFs: the reference for the shader's.
-    /// A texel (probability p) is picked, then a uniform point in its (u, v) cell: pdf = p · width · height / (2π² sin θ).
+    /// The fourth word of each texel, from the CDFs as they are stored.
+    fn store_probabilities(&mut self) {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let factor = (width * height) as f64 / (2.0 * PI * PI);
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            self.array[y * width + x][3] = ((self.texel_probability(x, y) * factor) as f32).to_bits();
+        }
+    }
+
+    /// Density in solid angle of drawing `direction` (unit, world space): the reference for the shader's.
+    /// It is the texels' probability, interpolated bilinearly, times width · height / (2π² sin θ).
     pub fn pdf_solid_angle(&self, direction: DVec3) -> f64 {
         if self.kind != EnvironmentKind::Image || self.conditional_word == 0 {
             return if self.kind == EnvironmentKind::None { 0.0 } else { 1.0 / (4.0 * PI) };
         }
         let (u, v) = direction_to_uv(direction, self.rotation_radians);
-        let (width, height) = (self.width as usize, self.height as usize);
-        let x = ((u * width as f64) as usize).min(width - 1);
-        let y = ((v * height as f64) as usize).min(height - 1);
-        let sin_theta = (v * PI).sin();
-        let probability = self.texel_probability(x, y);
+        let (width, height) = (i64::from(self.width), i64::from(self.height));
+        let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
+        let (fx, fy) = (x - x.floor(), y - y.floor());
+        let texel = |i: i64, j: i64| {
+            let (x, y) = ((x.floor() as i64 + i).rem_euclid(width), (y.floor() as i64 + j).clamp(0, height - 1));
+            self.texel_probability(x as usize, y as usize)
+        };
+        let row = |j: i64| texel(0, j) * (1.0 - fx) + texel(1, j) * fx;
+        let probability = row(0) * (1.0 - fy) + row(1) * fy;
         if probability == 0.0 {
             return 0.0;
         }
-        probability * (width * height) as f64 / (2.0 * PI * PI * sin_theta)
+        probability * (width * height) as f64 / (2.0 * PI * PI * (v * PI).sin())
     }
 
     /// Probability of picking a texel.

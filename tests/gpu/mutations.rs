@@ -29,9 +29,17 @@ mutations! {
         "environment_row_word(constants, row.index)" =>
         "environment_row_word(constants, (row.index + 1u) % constants.environment_height)",
         caught by "environment_chi_square::importance_sampling_follows_the_pdf";
+    /// A point is uniform between a texel's centre and its neighbours'.
+    flat_tent: "include/environment.glsl",
+        "sqrt(2.0 * min(area, 0.5))" => "2.0 * min(area, 0.5)",
+        caught by "environment_chi_square::importance_sampling_follows_the_pdf";
+    /// Beyond the pole is the other side of the pole.
+    unfolded_tent: "include/environment.glsl",
+        "min(abs(p.y), 2.0 * size.y - p.y)" => "p.y",
+        caught by "environment_chi_square::importance_sampling_follows_the_pdf";
     /// The environment's density per texel area, not per solid angle.
     dropped_jacobian: "include/environment.glsl",
-        "(2.0 * PI * PI * sine)" => "(2.0 * PI * PI)",
+        "image.w > 0.0 ? image.w / sine : 0.0" => "image.w",
         caught by "environment_chi_square::importance_sampling_follows_the_pdf";
     /// A lamp's density per area, not per solid angle.
     dropped_distance: "include/light.glsl",

@@ -1,4 +1,4 @@
-//! The environment's CDFs: normalised, no positive lookup without a positive density, unbiased.
+//! The environment's CDFs: normalised, no positive lookup without a positive density, which follows the interpolated image.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use crate::common::random::Random;
 use glam::DVec3;
 use sunfleck::layout::CDF_TOTAL;
 use sunfleck::prepare::EnvironmentSampling::{Importance, Uniform};
-use sunfleck::prepare::environment::{EnvironmentKind, PreparedEnvironment, direction_to_uv, prepare};
+use sunfleck::prepare::environment::{EnvironmentKind, PreparedEnvironment, direction_to_uv, prepare, tent_sine};
 use sunfleck::scene::Environment;
 
 fn image(width: u32, height: u32, rotation_radians: f64, texel: impl Fn(u32, u32) -> [f32; 3]) -> Environment {
@@ -67,7 +67,8 @@ fn check(environment: &Environment) -> PreparedEnvironment {
         assert_eq!((row[0], row[width]), (0, if picked { CDF_TOTAL } else { 0 }));
         assert!(row.is_sorted());
     }
-    // The density integrates to 1: sin θ cancels, so the midpoint rule is exact within a cell.
+    // The density integrates to 1: sin θ cancels and what is left is bilinear between centres, so that the midpoint rule is
+    // exact in quarters of a texel.
     let total = integrate(&prepared, 2, |direction, _, _| prepared.pdf_solid_angle(direction));
     assert!((total - 1.0).abs() < 1e-9, "{total}");
     // No direction that is bright is impossible.
@@ -95,8 +96,8 @@ fn mean_luminance_is_the_integral() {
     let environment = image(16, 8, 0.0, |x, y| [(x * 3 + y * y) as f32; 3]);
     let prepared = check(&environment);
     let flux = 2.0 * integrate(&prepared, 32, |_, u, v| lookup(&prepared, u, v));
-    // A row's weight takes the lookup's mean over the cell before sin θ, which differs in second order of the row.
-    assert!((flux / (4.0 * PI) / prepared.mean_luminance - 1.0).abs() < 0.01);
+    // What is left is the error of midpoints for sin θ, (π/(8·32))²/24.
+    assert!((flux / (4.0 * PI) / prepared.mean_luminance - 1.0).abs() < 1e-5);
 }
 
 #[test]
@@ -107,16 +108,17 @@ fn a_dim_texel_beside_a_blinding_one_is_not_lost() {
         _ => [0.0; 3],
     }));
     assert!(prepared.texel_probability(20, 10) > 0.0);
-    assert!(prepared.texel_probability(19, 9) > 0.0, "bilinear lookups there are positive");
-    assert_eq!(prepared.texel_probability(18, 10), 0.0);
-    assert_eq!(prepared.texel_probability(20, 14), 0.0);
+    assert_eq!(prepared.texel_probability(19, 10), 0.0, "black texels are never picked");
+    let pdf = |x: f64, y: f64| prepared.pdf_solid_angle(direction(x / 32.0, y / 16.0));
+    assert!(pdf(19.6, 9.6) > 0.0 && pdf(21.4, 11.4) > 0.0, "bilinear lookups there are positive");
+    assert_eq!((pdf(19.4, 10.5), pdf(20.5, 14.5)), (0.0, 0.0));
 }
 
 #[test]
 fn the_edge_column_leaks_around_u() {
     let prepared = check(&image(8, 4, 0.0, |x, y| if (x, y) == (0, 0) { [1.0; 3] } else { [0.0; 3] }));
-    assert!(prepared.texel_probability(7, 0) > 0.0, "u wraps");
-    assert_eq!(prepared.texel_probability(0, 3), 0.0, "v does not");
+    assert!(prepared.pdf_solid_angle(direction(7.8 / 8.0, 0.1)) > 0.0, "u wraps");
+    assert_eq!(prepared.pdf_solid_angle(direction(0.01, 0.9)), 0.0, "v does not");
 }
 
 #[test]
@@ -151,4 +153,70 @@ fn black_images_are_no_environment_and_constants_need_no_tables() {
     assert!((white.pdf_solid_angle(DVec3::Y) - 0.25 / PI).abs() < 1e-15);
     let uniform = prepare(&image(4, 2, 0.0, |_, _| [1.0; 3]), Uniform).unwrap();
     assert_eq!((uniform.array.len(), uniform.conditional_word), (8, 0));
+}
+
+/// ∫ tent·sin θ of a row with the shader's clamping, by midpoints.
+fn tent_sine_by_midpoints(row: usize, height: usize) -> f64 {
+    const STEPS: usize = 1 << 16;
+    let angle = |x: f64| (row as f64 + 0.5 + x) * PI / height as f64;
+    let at = |i: usize| (2.0 * i as f64 + 1.0) / STEPS as f64 - 1.0;
+    // Beyond a pole the sine is negative: it is the mirrored point that is there.
+    (0..STEPS).map(|i| (1.0 - at(i).abs()) * angle(at(i)).sin().abs()).sum::<f64>() * 2.0 / STEPS as f64
+}
+
+#[test]
+fn tents_hold_their_share_of_the_sphere() {
+    for height in [1, 2, 3, 16, 4096] {
+        for row in [0, 1, height / 2, height - 1].into_iter().filter(|row| *row < height) {
+            let (closed, summed) = (tent_sine(row, height), tent_sine_by_midpoints(row, height));
+            assert!((closed / summed - 1.0).abs() < 1e-6, "{row} of {height}: {closed} and {summed}");
+        }
+        // A white image: the whole sphere, 4π.
+        let total: f64 = (0..height).map(|row| tent_sine(row, height)).sum();
+        assert!((total * 2.0 * PI * PI / height as f64 / (4.0 * PI) - 1.0).abs() < 1e-9, "{height}: {total}");
+    }
+}
+
+/// Mean square of luminance/pdf over its squared mean, less 1, of what is drawn by the density: by midpoints in (u, v).
+fn relative_variance(environment: &PreparedEnvironment) -> f64 {
+    let square = |direction, u, v| {
+        let light = lookup(environment, u, v);
+        if light > 0.0 { light * light / environment.pdf_solid_angle(direction) } else { 0.0 }
+    };
+    let mean = integrate(environment, 16, |_, u, v| lookup(environment, u, v));
+    integrate(environment, 16, square) / (mean * mean) - 1.0
+}
+
+/// With A the interpolated luminance and s the interpolated product of luminance and [`tent_sine`], luminance/pdf is
+/// proportional to A·sin θ/s, and s/A a mean of the sines of the two rows around θ. So it is off its mean by at most
+/// b = max |sin θ/sine − 1| over both, relatively, and its variance at most ∫ b² over the density. The pole's rows, where
+/// sin θ goes to 0, are most of that.
+fn variance_bound(environment: &PreparedEnvironment) -> f64 {
+    let height = environment.height as usize;
+    integrate(environment, 16, |direction, _, v| {
+        let y = v * height as f64 - 0.5;
+        let off = |row: f64| (v * PI).sin() / tent_sine((row.max(0.0) as usize).min(height - 1), height) - 1.0;
+        let b = off(y.floor()).abs().max(off(y.floor() + 1.0).abs());
+        environment.pdf_solid_angle(direction) * b * b
+    })
+}
+
+/// Nothing of the image is left in luminance/pdf, whatever its contrast: only what sin θ changes within a row.
+#[test]
+fn the_density_follows_the_interpolated_image() {
+    let mut random = Random(3);
+    let noise: Vec<f32> = (0..64 * 32).map(|_| random.unit().powi(4) as f32).collect();
+    let sun = |x: u32, y: u32| if (x, y) == (11, 9) { 1e5 } else { noise[(y * 64 + x) as usize] };
+    let at = |x: u32, y: u32| noise[(y * 64 + x) as usize];
+    for (name, environment) in [
+        ("noise", image(64, 32, 0.0, |x, y| [at(x, y); 3])),
+        ("sun", image(64, 32, 0.0, |x, y| [sun(x, y); 3])),
+        ("smooth", image(64, 32, 0.0, |x, y| [(2.0 + (x as f32 * 0.1).sin() + (y as f32 * 0.2).cos()) as f32; 3])),
+    ] {
+        let prepared = prepare(&environment, Importance).unwrap();
+        let (variance, bound) = (relative_variance(&prepared), variance_bound(&prepared));
+        println!("{name}: relative variance {variance:.3e}, bound {bound:.3e}");
+        assert!(variance <= bound, "{name}: {variance} above {bound}");
+        assert!(bound < 0.05, "{name}: the bound says something: {bound}");
+    }
 }
