@@ -87,10 +87,10 @@ struct TentPoint {
 
 // Distributed as the tent. What the pick leaves of its number, with the bits of `dither` below its point, is uniform in
 // (0, count); the tent's area on the nearer side of it is own²/2 of the whole. From either end it is exact.
-TentPoint tent_point(CdfBin bin, uint dither) {
+TentPoint tent_point(CdfSample bin, uint dither) {
     float below = (float(dither >> 9u) + 0.5) * 1.1920928955078125e-7;
-    float before = float(bin.remainder) + below;
-    float after = float(bin.count - 1u - bin.remainder) + (1.0 - below);
+    float before = float(bin.offset) + below;
+    float after = float(bin.count - 1u - bin.offset) + (1.0 - below);
     float area = min(before, after) / float(bin.count);
     // At the centre rounding may leave more than a half.
     return TentPoint(sqrt(2.0 * min(area, 0.5)), before > after);
@@ -104,8 +104,8 @@ EnvironmentSample environment_sample(RenderConstants constants, uvec4 bits) {
         vec3 w = vec3(horizontal.x, cosine, horizontal.y);
         return EnvironmentSample(w, environment_radiance(constants, w), 0.25 * INV_PI);
     }
-    CdfBin row = cdf_bin_ENVIRONMENT(constants.environment_marginal_word, constants.environment_height, bits.x);
-    CdfBin column = cdf_bin_ENVIRONMENT(environment_row_word(constants, row.index), constants.environment_width, bits.y);
+    CdfSample row = cdf_sample_ENVIRONMENT(constants.environment_marginal_word, constants.environment_height, bits.x);
+    CdfSample column = cdf_sample_ENVIRONMENT(environment_row_word(constants, row.index), constants.environment_width, bits.y);
     TentPoint across = tent_point(column, bits.z);
     TentPoint down = tent_point(row, bits.w);
     vec2 own = vec2(across.own, down.own);

@@ -70,12 +70,15 @@ LightSample sample_positional_light(Light light, vec3 from, float pick) {
     return LightSample(direction, distance, intensity / (distance * distance) / pick, 0.0, NO_TRIANGLE);
 }
 
-// `bits`: which light, position u, v. `environment_bits`: see environment_sample.
+// `bits`: which light, digits below it, position v: the position's u is where in the light's bin the first number falls.
+// `environment_bits`: see environment_sample.
 LightSample sample_light(RenderConstants constants, vec3 from, uvec3 bits, uvec4 environment_bits) {
     CdfSample pick = cdf_sample_TABLES(constants.light_cdf_word, constants.light_count, bits.x);
     Light light = load_light(constants, pick.index);
-    if (HAS_LIGHT(LIGHT_TRIANGLE) && light.kind == LIGHT_TRIANGLE)
-        return sample_triangle_light(constants, light, from, vec2(to_unit(bits.y), to_unit(bits.z)), pick.probability);
+    if (HAS_LIGHT(LIGHT_TRIANGLE) && light.kind == LIGHT_TRIANGLE) {
+        vec2 u = vec2(cdf_rest(pick, bits.y), to_unit(bits.z));
+        return sample_triangle_light(constants, light, from, u, pick.probability);
+    }
     if (HAS_LIGHT(LIGHT_ENVIRONMENT) && light.kind == LIGHT_ENVIRONMENT) {
         EnvironmentSample s = environment_sample(constants, environment_bits);
         float pdf = s.pdf * pick.probability;

@@ -9,7 +9,7 @@
 const uint DIMENSIONS_FILM = 0u;     // x, y in the pixel; lens u, v
 const uint DIMENSIONS_TIME = 1u;     // time; filter; two in reserve
 const uint DIMENSIONS_SCATTER = 2u;  // lobe; direction u, v; roulette
-const uint DIMENSIONS_LIGHT = 3u;    // which light; position u, v; which strategy (mixture)
+const uint DIMENSIONS_LIGHT = 3u;    // which light and position u; digits below that; position v; which strategy (mixture)
 const uint DIMENSIONS_ENVIRONMENT = 4u;  // row; column; position u, v under the texel's tent
 const uint DIMENSIONS_ALPHA = 5u;    // decisions about alpha: key of the path's ray; key of the shadow ray
 const uint DIMENSION_GROUPS = 8u;
@@ -46,7 +46,7 @@ uvec4 hashed_bits(SampleKey key, uint bounce, uint group) {
 }
 
 // The same as two Sobol' pairs, each in an order of its own (padding: PBR, 4th ed., §8.6.3). What belongs together is a
-// pair: of scattering and of lights the two in the middle, and the two around them.
+// pair: of scattering the two in the middle, of lights the first and the third, and what is left.
 uvec4 sobol_bits(SampleKey key, uint bounce, uint group) {
     uint x = key.pixel & 0xffffu;
     uint y = key.pixel >> 16u;
@@ -63,7 +63,8 @@ uvec4 sobol_bits(SampleKey key, uint bounce, uint group) {
     uvec4 b = pcg4d(a);
     uvec2 first = sobol_pair(key.index, z, a);
     uvec2 second = sobol_pair(key.index, z, b);
-    if (group == DIMENSIONS_SCATTER || group == DIMENSIONS_LIGHT) return uvec4(second.x, first, second.y);
+    if (group == DIMENSIONS_SCATTER) return uvec4(second.x, first, second.y);
+    if (group == DIMENSIONS_LIGHT) return uvec4(first.x, second.x, first.y, second.y);
     return uvec4(first, second);
 }
 

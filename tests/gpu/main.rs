@@ -28,6 +28,7 @@ mod shader_math;
 mod shaders_valid;
 mod shading_normals;
 mod sobol;
+mod sobol_images;
 mod specialized_kernels;
 mod texture;
 mod trace;

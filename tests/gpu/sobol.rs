@@ -37,7 +37,11 @@ fn bits(kernel: &TestKernel, keys: &[Key]) -> Vec<[u32; 4]> {
 
 /// The dimensions of a group that are a pair.
 fn pairs(group: u32) -> [[usize; 2]; 2] {
-    if group == 2 || group == 3 { [[1, 2], [0, 3]] } else { [[0, 1], [2, 3]] }
+    match group {
+        2 => [[1, 2], [0, 3]],
+        3 => [[0, 2], [1, 3]],
+        _ => [[0, 1], [2, 3]],
+    }
 }
 
 /// Whether each elementary interval of volume 2^-n, of every shape, holds one of the 2^n points: a (0, n, 2)-net.
