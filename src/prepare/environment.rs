@@ -127,7 +127,8 @@ struct Tents<'a> {
 impl<'a> Tents<'a> {
     fn new(width: u32, height: u32, texels: &'a [[f32; 3]]) -> Self {
         let (width, height) = (width as usize, height as usize);
-        let row = |(y, row): (usize, &[[f32; 3]])| row.iter().map(|t| luminance(*t)).sum::<f64>() * tent_sine(y, height);
+        let row =
+            |(y, row): (usize, &[[f32; 3]])| row.iter().map(|t| luminance(*t)).sum::<f64>() * tent_sine(y, height);
         let rows = texels.chunks_exact(width).enumerate().map(row).collect();
         Self { width, height, texels, rows }
     }
