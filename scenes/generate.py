@@ -571,8 +571,8 @@ def near_lamps():
     # A panel a hand above the floor that touches the wall, and a thin strip that stands on the floor.
     panel = scene.diffuse("panel", (0, 0, 0), emission=(1, 0.9, 0.8))
     scene.place("panel", quad((-0.7, 0.1, -0.5), (0.3, 0.1, -0.5), (0.3, 0.1, 0.5), (-0.7, 0.1, 0.5)), panel)
-    strip = scene.diffuse("strip", (0, 0, 0), emission=(20, 30, 40), double_sided=True)
-    scene.place("strip", quad((0.8, 0, 0.3), (0.801, 0, 0.3), (0.801, 1, 0.3), (0.8, 1, 0.3)), strip)
+    strip = scene.diffuse("strip", (0, 0, 0), emission=(2, 3, 4), double_sided=True)
+    scene.place("strip", quad((0.8, 0, 0.3), (0.83, 0, 0.3), (0.83, 1, 0.3), (0.8, 1, 0.3)), strip)
     scene.camera((0, 1.2, 3.2), (0, 0.3, 0), 40)
     scene.write("near_lamps")
 

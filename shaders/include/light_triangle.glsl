@@ -95,8 +95,12 @@ vec3 sample_solid_angle(RelativeTriangle t, vec2 u) {
     float squared = 1.0 - 2.0 * (difference + beta) * beta * chord;
     float of_a = difference / squared;
     float of_c = 2.0 * beta * (1.0 - beta * chord) / squared;
-    float whole = max(1.0 - (of_a * dot(s.a, s.b) + of_c * dot(s.b, s.c)), 0.0);  // 1 − b·a'
-    float cut = sqrt(u.y * (2.0 - u.y * whole) / (2.0 - whole));
+    // 1 + b·a' = |b + a'|²/2, of which the length is known to 2^-22. It is that small only for a point that touches the
+    // inside of the triangle, where a' is opposite to b.
+    vec3 opposite = of_a * s.a + of_c * s.c + s.b;
+    float rest = max(0.5 * dot(opposite, opposite), 5.684341886080802e-14);
+    float whole = max(2.0 - rest, 0.0);  // 1 − b·a'
+    float cut = sqrt(u.y * (2.0 - u.y * whole) / rest);
     vec3 weights = vec3(cut * of_a, (1.0 - cut) + whole * (cut - u.y), cut * of_c) * (s.distances.x / s.distances);
     return vec3(weights.yz / (weights.x + weights.y + weights.z), 4.0 * PI * s.half_turns);
 }

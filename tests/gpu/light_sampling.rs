@@ -285,6 +285,7 @@ fn near_lamps_are_sampled_by_solid_angle() {
     let cases = [
         (plain, DVec3::new(0.4, 0.5, 0.4), "near"),
         (plain, DVec3::new(0.4, 1.0 - 1.0 / 1024.0, 0.4), "touching"),
+        (plain, DVec3::new(0.4, 1.0 - 1.0 / 65536.0, 0.4), "touching more closely"),
         (plain, DVec3::new(0.5, 0.99, 0.12), "below an edge"),
         (plain, DVec3::new(0.01, 0.98, 0.0), "at the first corner"),
         (plain, DVec3::new(0.99, 0.98, 0.25), "at the second corner"),

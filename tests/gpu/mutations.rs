@@ -109,7 +109,7 @@ mutations! {
         caught by "light_sampling::near_lamps_are_sampled_by_solid_angle";
     /// The planar mapping on the sphere.
     flat_arc: "include/light_triangle.glsl",
-        "sqrt(u.y * (2.0 - u.y * whole) / (2.0 - whole))" => "sqrt(u.y)",
+        "sqrt(u.y * (2.0 - u.y * whole) / rest)" => "sqrt(u.y)",
         caught by "light_sampling::near_lamps_are_sampled_by_solid_angle";
     /// Light that a normal map sends into the surface is lost.
     absorbed_below_the_horizon: "include/surface.glsl",
