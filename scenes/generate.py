@@ -564,6 +564,19 @@ def caustic():
     scene.write("caustic")
 
 
+def near_lamps():
+    scene = Scene()
+    scene.place("floor", floor(2), scene.diffuse("floor", (0.5, 0.5, 0.5)))
+    scene.place("wall", quad((-2, 0, -0.5), (2, 0, -0.5), (2, 2, -0.5), (-2, 2, -0.5)), scene.diffuse("wall", (0.5, 0.4, 0.3)))
+    # A panel a hand above the floor that touches the wall, and a thin strip that stands on the floor.
+    panel = scene.diffuse("panel", (0, 0, 0), emission=(1, 0.9, 0.8))
+    scene.place("panel", quad((-0.7, 0.1, -0.5), (0.3, 0.1, -0.5), (0.3, 0.1, 0.5), (-0.7, 0.1, 0.5)), panel)
+    strip = scene.diffuse("strip", (0, 0, 0), emission=(2, 3, 4), double_sided=True)
+    scene.place("strip", quad((0.8, 0, 0.3), (0.83, 0, 0.3), (0.83, 1, 0.3), (0.8, 1, 0.3)), strip)
+    scene.camera((0, 1.2, 3.2), (0, 0.3, 0), 40)
+    scene.write("near_lamps")
+
+
 if __name__ == "__main__":
     cornell_spheres()
     furnace_box("furnace_box", 0.5)
@@ -580,3 +593,4 @@ if __name__ == "__main__":
     anisotropy()
     many_lights()
     caustic()
+    near_lamps()

@@ -70,11 +70,12 @@ void add_environment(inout LaneState lane) {
     add_radiance(lane, lane.bounce, lane.throughput * light.rgb * emission_weight(lane, pdf));
 }
 
-void add_emission(inout LaneState lane, Surface surface, float distance) {
+void add_emission(inout LaneState lane, Surface surface, Hit hit) {
     if (max_component(surface.emission) <= 0.0) return;
     float pdf = 0.0;
     if (HAS_LIGHT(LIGHT_TRIANGLE) && surface.light != NONE && lane.emission_weight != WEIGHT_FULL)
-        pdf = triangle_light_pdf(constants, surface.light, surface.point, lane.ray.direction, distance);
+        pdf = triangle_light_pdf(constants, surface.light, hit.triangle, surface.point, lane.ray.origin, lane.ray.direction,
+                                 hit.t);
     add_radiance(lane, lane.bounce, lane.throughput * surface.emission * emission_weight(lane, pdf));
 }
 
@@ -192,7 +193,7 @@ bool shade(inout LaneState lane, Hit hit) {
         lane.media = surface.near;
         lane.throughput *= transmittance(constants, lane.media, hit.t);
     }
-    add_emission(lane, surface, hit.t);
+    add_emission(lane, surface, hit);
     if (surface.black || lane.bounce >= constants.max_bounces) return false;
     if (lane.bounce >= BOUNCE_CAP) {
         lane.capped |= 1u << (lane.sample_index % BLOCK_SAMPLES);

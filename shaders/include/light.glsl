@@ -5,6 +5,7 @@
 #include "cdf.glsl"
 #include "environment.glsl"
 #include "geometry.glsl"
+#include "light_triangle.glsl"
 #include "texture.glsl"
 
 struct LightSample {
@@ -28,11 +29,21 @@ bool emits_to_side(Material material, bool front) {
     return front || sides == MATERIAL_DOUBLE_SIDED;
 }
 
-// Uniform by area. `from` is the origin of the shadow ray.
+// Uniform by solid angle if the triangle is near, by area if not. `from` is the origin of the shadow ray.
 LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 from, vec2 u, float pick) {
     TriangleVertices vertices = load_triangle(light.slot);
     float root = sqrt(u.x);
     vec2 barycentric = vec2(root * (1.0 - u.y), root * u.y);
+    RelativeTriangle relative = relative_triangle(constants, vertices, light.instance, from);
+    Material material = load_material(constants, vertices.material);
+    // Beside a lamp, on the wall that it is set in, lanes would wait for nothing.
+    bool near = HAS_NEAR_LAMPS && triangle_is_near(relative) && emits_to_side(material, relative.front);
+    float solid_angle = 0.0;
+    if (near) {
+        vec3 s = sample_solid_angle(relative, u);
+        solid_angle = s.z;
+        if (solid_angle > 0.0) barycentric = s.xy;
+    }
     SurfacePoint point = surface_point(constants, vertices, light.instance, barycentric);
     vec3 offset = point.position - from;
     float scale = max_component(abs(offset));
@@ -40,7 +51,6 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     vec3 direction = safe_normalize(offset);
     float distance = dot(offset, direction);
     float cosine = -dot(direction, point.geometric_normal);
-    Material material = load_material(constants, vertices.material);
     if (cosine == 0.0 || !emits_to_side(material, cosine > 0.0)) return NO_LIGHT;
     vec3 emission = material.emission;
     Vertices attributes = interpolate_vertices(constants, vertices.triangle, light.instance, barycentric);
@@ -48,14 +58,22 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     // The shadow ray does not ask the triangle that it aims at whether it is there.
     if (HAS_ALPHA) emission *= surface_opacity(constants, material, attributes);
     float pdf = pick / point.area * (distance * distance) / abs(cosine);
+    if (solid_angle > 0.0) pdf = pick / solid_angle;
     return LightSample(direction, distance, emission / pdf, pdf,
                        TriangleId(light.slot, light.instance));
 }
 
-// Density with which light sampling from `distance` away along unit `direction` draws the point.
-float triangle_light_pdf(RenderConstants constants, uint light, SurfacePoint point, vec3 direction, float distance) {
-    return light_pick_probability(constants, light) / point.area * (distance * distance) /
-           abs(dot(direction, point.geometric_normal));
+// Density with which light sampling from `from` draws the point of a triangle, `distance` away along unit `direction`.
+float triangle_light_pdf(RenderConstants constants, uint light, TriangleId triangle, SurfacePoint point, vec3 from,
+                         vec3 direction, float distance) {
+    float pick = light_pick_probability(constants, light);
+    float pdf = pick / point.area * (distance * distance) / abs(dot(direction, point.geometric_normal));
+    RelativeTriangle relative = relative_triangle(constants, load_triangle(triangle.slot), triangle.instance, from);
+    if (HAS_NEAR_LAMPS && triangle_is_near(relative)) {
+        float solid_angle = triangle_solid_angle(relative);
+        if (solid_angle > 0.0) pdf = pick / solid_angle;
+    }
+    return pdf;
 }
 
 // Point and spot lights (KHR_lights_punctual).

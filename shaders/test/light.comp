@@ -17,10 +17,8 @@ void main() {
     if (s.triangle.slot != NONE) {
         // As where a ray finds the light: the point is known by the intersection, not by the numbers it was drawn with.
         TriangleVertices vertices = load_triangle(s.triangle.slot);
-        float root = sqrt(to_unit(b.x));
-        vec2 barycentric = vec2(root * (1.0 - to_unit(b.y)), root * to_unit(b.y));
-        SurfacePoint point = surface_point(constants, vertices, s.triangle.instance, barycentric);
-        pdf = triangle_light_pdf(constants, light, point, s.direction, s.distance);
+        SurfacePoint point = surface_point(constants, vertices, s.triangle.instance, vec2(0.25));
+        pdf = triangle_light_pdf(constants, light, s.triangle, point, from, s.direction, s.distance);
     }
     outputs[3u * lane] = floatBitsToUint(vec4(s.direction, s.distance));
     outputs[3u * lane + 1u] = floatBitsToUint(vec4(s.radiance, s.pdf));

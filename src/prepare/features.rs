@@ -18,6 +18,8 @@ pub struct Features {
     pub textures: bool,
     /// Any texture with a mip chain: paths carry ray cones.
     pub mip: bool,
+    /// Any surface so near to an emissive triangle that its solid angle is sampled.
+    pub near_lamps: bool,
     /// Any emission texture.
     pub emission_textures: bool,
     /// Two-level traversal.
@@ -78,6 +80,7 @@ impl Features {
             ("alpha", self.alpha),
             ("instances", self.instances),
             ("triangle-lights", light(LIGHT_TRIANGLE)),
+            ("near-lamps", self.near_lamps),
             ("point-lights", light(LIGHT_POINT)),
             ("spot-lights", light(LIGHT_SPOT)),
             ("directional-lights", light(LIGHT_DIRECTIONAL)),

@@ -18,6 +18,7 @@ mod instances;
 mod lights;
 mod materials;
 mod mip;
+mod near_lamps;
 mod pack;
 mod textures;
 mod vertices;
@@ -209,7 +210,8 @@ pub fn prepare(scene: &Scene, options: &PrepareOptions) -> Result<Prepared, Prep
     let environment = environment::prepare(&scene.environment, sampling)?;
     let lights =
         lights::gather(scene, &geometry, &mut acceleration, &materials, &environment, options.sample_environment)?;
-    let features = pack::features(&geometry, &acceleration, &materials, &textures, &environment, &lights);
+    let mut features = pack::features(&geometry, &acceleration, &materials, &textures, &environment, &lights);
+    features.near_lamps = lights.kinds() & (1 << crate::layout::LIGHT_TRIANGLE) != 0 && near_lamps::any(scene);
     let mut statistics = pack::statistics(&acceleration, &lights);
     let instances = pack::prepared_instances(&acceleration);
     let meshes = std::mem::take(&mut acceleration.meshes);

@@ -88,6 +88,7 @@ impl KernelKey {
             f.transmission,
             f.volume,
             f.mip,
+            f.near_lamps,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {

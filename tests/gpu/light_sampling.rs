@@ -1,4 +1,4 @@
-//! `sample_light`: lights are picked by their CDF, points are uniform on triangles, densities are those of the solid angle,
+//! `sample_light`: lights are picked by their CDF, points are uniform on far triangles and by solid angle on near ones, densities are those of the solid angle,
 //! and the light that arrives is what radiometry says: Lambert's formula for polygons, KHR_lights_punctual for the rest.
 
 use std::collections::BTreeMap;
@@ -190,7 +190,7 @@ fn barycentric([a, b, c]: [DVec3; 3], point: DVec3) -> (f64, f64) {
 fn points_are_uniform_on_triangles() {
     const BINS: usize = 8;
     let kernel = kernel(&scene_of(rectangle(), &placements(), true));
-    let from = DVec3::new(0.4, -2.0, 0.1);
+    let from = DVec3::new(0.4, -9.0, 0.1);
     let mut bins: BTreeMap<(u32, u32), Vec<u64>> = BTreeMap::new();
     for s in sample(&kernel, &vec![from; 2 * SAMPLES], 2) {
         let triangle = world_triangle(&kernel, s.slot, s.instance);
@@ -215,24 +215,133 @@ fn points_are_uniform_on_triangles() {
     }
 }
 
-/// pick / area · distance² / cos, in f64; the radiance is divided by it; and a ray that finds the point finds it again.
+/// Solid angle of a triangle (Van Oosterom and Strackee 1983, eq. 8), and whether `triangle_is_near`.
+fn solid_angle(triangle: [DVec3; 3], from: DVec3) -> (f64, bool) {
+    let [a, b, c] = triangle.map(|v| v - from);
+    let edge = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    let nearest = a.length_squared().min(b.length_squared()).min(c.length_squared());
+    // Written so that it keeps its digits near the plane.
+    let volume = a.dot((b - a).cross(c - a)).abs();
+    let [x, y, z] = [a, b, c].map(DVec3::length);
+    (2.0 * volume.atan2(x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y), edge >= nearest)
+}
+
+/// In f64: pick / area · distance² / cos where the triangle is far, pick / solid angle where it is near; the radiance is
+/// divided by it; and a ray that finds the point finds it again.
 #[test]
 fn densities_are_per_solid_angle() {
     let kernel = kernel(&scene_of(rectangle(), &placements(), true));
     let mut random = Random(3);
     let from: Vec<DVec3> = (0..4096).map(|_| random.point(4.0)).collect();
+    let mut seen = [0; 2];
     for (s, from) in sample(&kernel, &from, 4).iter().zip(&from) {
         let [a, b, c] = world_triangle(&kernel, s.slot, s.instance);
         let normal = (b - a).cross(c - a);
         let area = 0.5 * normal.length();
         let cosine = s.direction.dot(normal.normalize()).abs();
-        let pdf = pick_probability(&kernel, s.light) / area * s.distance * s.distance / cosine;
+        let by_area = 1.0 / area * s.distance * s.distance / cosine;
+        let (solid_angle, near) = solid_angle([a, b, c], *from);
+        let pdf = pick_probability(&kernel, s.light) * if near { 1.0 / solid_angle } else { by_area };
+        seen[usize::from(near)] += 1;
         // Positions within some metres carry errors of 2^-21, which the cosine of a grazing direction amplifies.
         let tolerance = 4e-6 * (1.0 + 4.0 / cosine);
         assert!(((s.pdf - pdf) / pdf).abs() < tolerance, "{s:?} from {from}: {pdf}");
         assert!(((s.pdf_again - s.pdf) / s.pdf).abs() < tolerance, "{s:?} from {from}");
         let radiance = s.radiance * s.pdf;
         assert!((radiance - DVec3::new(5.0, 2.0, 1.0)).abs().max_element() < 1e-5, "{s:?}: {radiance}");
+    }
+    assert!(seen[0] > 500 && seen[1] > 500, "far and near ones: {seen:?}");
+}
+
+/// A triangle in four, recursively, by the middles of its edges.
+fn parts([a, b, c]: [DVec3; 3], levels: u32) -> Vec<[DVec3; 3]> {
+    if levels == 0 {
+        return vec![[a, b, c]];
+    }
+    let [ab, bc, ca] = [a.midpoint(b), b.midpoint(c), c.midpoint(a)];
+    let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+    quarters.into_iter().flat_map(|t| parts(t, levels - 1)).collect()
+}
+
+/// The part that holds a point of the plane: the one of which its least weight is largest.
+fn part_of(parts: &[[DVec3; 3]], point: DVec3) -> usize {
+    let least = |t: &[DVec3; 3]| {
+        let (v, w) = barycentric(*t, point);
+        v.min(w).min(1.0 - v - w)
+    };
+    (0..parts.len()).max_by(|&i, &j| least(&parts[i]).total_cmp(&least(&parts[j]))).expect("there are parts")
+}
+
+/// Near lamps, a lamp that touches the point, beside its edge and its corner, a sliver along and across the view, one that
+/// is seen nearly edge-on: each part of them is drawn in proportion to its solid angle, and the density is 1 over the whole.
+#[test]
+fn near_lamps_are_sampled_by_solid_angle() {
+    let triangle = |a: [f32; 3], b: [f32; 3], c: [f32; 3]| Primitive {
+        positions: vec![a, b, c],
+        triangles: vec![[0, 1, 2]],
+        ..Primitive::default()
+    };
+    let plain = [[0.0, 1.0, 0.0], [1.0, 1.0, 0.25], [0.25, 1.0, 1.0]];
+    let cases = [
+        (plain, DVec3::new(0.4, 0.5, 0.4), "near"),
+        (plain, DVec3::new(0.4, 1.0 - 1.0 / 1024.0, 0.4), "touching"),
+        (plain, DVec3::new(0.4, 1.0 - 1.0 / 65536.0, 0.4), "touching more closely"),
+        (plain, DVec3::new(0.5, 0.99, 0.12), "below an edge"),
+        (plain, DVec3::new(0.01, 0.98, 0.0), "at the first corner"),
+        (plain, DVec3::new(0.99, 0.98, 0.25), "at the second corner"),
+        (plain, DVec3::new(0.26, 1.02, 0.99), "at the third corner, behind"),
+        (plain, DVec3::new(-0.5, 0.99, 0.4), "nearly edge-on"),
+        ([[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 1e-3]], DVec3::new(0.3, 0.8, 0.1), "a sliver"),
+        ([[0.0, 1.0, 0.0], [0.0, 1.0, 1e-3], [1.0, 1.0, 0.0]], DVec3::new(0.0, 0.8, 0.1), "a sliver, turned"),
+        ([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1e-3]], DVec3::new(0.9, 0.9, 0.0), "a sliver, its tip near"),
+    ];
+    for (corners, from, name) in cases {
+        let [a, b, c] = corners;
+        let kernel = kernel(&scene_of(triangle(a, b, c), &[DAffine3::IDENTITY], true));
+        let samples = sample(&kernel, &vec![from; SAMPLES], 8);
+        // As the shader knows the point: in f32, about the scene's own origin.
+        let from = (from - kernel.prepared.origin).as_vec3().as_dvec3() + kernel.prepared.origin;
+        let lamp = world_lights(&kernel)[0];
+        let (whole, near) = solid_angle(lamp, from);
+        assert!(near, "{name}");
+        let parts = parts(lamp, 2);
+        let mut observed = vec![0; parts.len()];
+        for s in &samples {
+            assert!((s.pdf * whole - 1.0).abs() < 1e-4, "{name}: {} instead of {}", s.pdf, 1.0 / whole);
+            assert!((s.pdf_again / s.pdf - 1.0).abs() < 1e-6, "{name}: {s:?}");
+            observed[part_of(&parts, from + s.direction * s.distance)] += 1;
+        }
+        let expected: Vec<f64> = parts.iter().map(|t| solid_angle(*t, from).0 / whole * SAMPLES as f64).collect();
+        let result = chi_square_test(&observed, &expected, SAMPLES as u64);
+        assert!(result.p_value > sidak(ALPHA, cases.len()), "{name}: {observed:?}, not {expected:?}: {result:?}");
+    }
+}
+
+/// Lamps as thin as floats allow, points in their plane, on an edge and at a vertex: no density that is not finite, and the
+/// irradiance is what it should be where there is any.
+#[test]
+fn degenerate_views_of_lamps_are_finite() {
+    for width in [1e-3_f32, 1e-6, 1e-12, 1e-20] {
+        let sliver = Primitive {
+            positions: vec![[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.5, 1.0, width]],
+            triangles: vec![[0, 1, 2]],
+            ..Primitive::default()
+        };
+        let kernel = kernel(&scene_of(sliver, &[DAffine3::IDENTITY], true));
+        if light_records(&kernel).is_empty() {
+            continue;
+        }
+        let points = [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.5, 1.0, 0.0], [0.5, 1.0, 0.3], [0.5, 1.0 - 1e-6, 0.0]];
+        for point in points.map(DVec3::from) {
+            for s in sample(&kernel, &vec![point; 1024], 9) {
+                let fine = s.pdf.is_finite() && s.radiance.is_finite() && s.pdf_again.is_finite();
+                assert!(fine && s.direction.is_finite() && s.pdf >= 0.0, "width {width} at {point}: {s:?}");
+            }
+        }
+        let lamp = world_lights(&kernel)[0];
+        let exact = 2.0 * polygon_irradiance(&lamp, points.map(DVec3::from)[0], DVec3::Y);
+        let estimate = sampled_irradiance(&kernel, points.map(DVec3::from)[0], DVec3::Y, 12);
+        assert!(p_value(&estimate, exact) > sidak(ALPHA, 4), "width {width}: {estimate:?} instead of {exact}");
     }
 }
 

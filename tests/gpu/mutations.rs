@@ -100,8 +100,17 @@ mutations! {
         caught by "alpha::a_mask_is_the_geometry_cut_out";
     /// Emission met by chance is weighted as if its lamp were the only one.
     pick_left_out: "include/light.glsl",
-        "return light_pick_probability(constants, light) / point.area" => "return 1.0 / point.area",
+        "float pick = light_pick_probability(constants, light);" => "float pick = 1.0;",
         caught by "light_sampling::densities_are_per_solid_angle";
+    /// A near lamp's solid angle halved where it is met by chance.
+    half_the_solid_angle: "include/light_triangle.glsl",
+        "float triangle_solid_angle(RelativeTriangle t) { return 4.0" =>
+        "float triangle_solid_angle(RelativeTriangle t) { return 2.0",
+        caught by "light_sampling::near_lamps_are_sampled_by_solid_angle";
+    /// The planar mapping on the sphere.
+    flat_arc: "include/light_triangle.glsl",
+        "sqrt(u.y * (2.0 - u.y * whole) / rest)" => "sqrt(u.y)",
+        caught by "light_sampling::near_lamps_are_sampled_by_solid_angle";
     /// Light that a normal map sends into the surface is lost.
     absorbed_below_the_horizon: "include/surface.glsl",
         "if (dot(drawn.wi, horizon) < 0.0) drawn.wi = other;" =>

@@ -211,7 +211,7 @@ fn the_density_follows_the_interpolated_image() {
     for (name, environment) in [
         ("noise", image(64, 32, 0.0, |x, y| [at(x, y); 3])),
         ("sun", image(64, 32, 0.0, |x, y| [sun(x, y); 3])),
-        ("smooth", image(64, 32, 0.0, |x, y| [(2.0 + (x as f32 * 0.1).sin() + (y as f32 * 0.2).cos()) as f32; 3])),
+        ("smooth", image(64, 32, 0.0, |x, y| [2.0 + (x as f32 * 0.1).sin() + (y as f32 * 0.2).cos(); 3])),
     ] {
         let prepared = prepare(&environment, Importance).unwrap();
         let (variance, bound) = (relative_variance(&prepared), variance_bound(&prepared));
