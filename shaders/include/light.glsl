@@ -34,15 +34,15 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     TriangleVertices vertices = load_triangle(light.slot);
     float root = sqrt(u.x);
     vec2 barycentric = vec2(root * (1.0 - u.y), root * u.y);
-    RelativeTriangle relative = relative_triangle(constants, vertices, light.instance, from);
-    Material material = load_material(constants, vertices.material);
-    // Beside a lamp, on the wall that it is set in, lanes would wait for nothing.
-    bool near = HAS_NEAR_LAMPS && triangle_is_near(relative) && emits_to_side(material, relative.front);
     float solid_angle = 0.0;
-    if (near) {
-        vec3 s = sample_solid_angle(relative, u);
-        solid_angle = s.z;
-        if (solid_angle > 0.0) barycentric = s.xy;
+    if (HAS_NEAR_LAMPS) {
+        RelativeTriangle relative = relative_triangle(constants, vertices, light.instance, from);
+        // Beside a lamp, on the wall that it is set in, lanes would wait for nothing.
+        if (triangle_is_near(relative) && emits_to_side(load_material(constants, vertices.material), relative.front)) {
+            vec3 s = sample_solid_angle(relative, u);
+            solid_angle = s.z;
+            if (solid_angle > 0.0) barycentric = s.xy;
+        }
     }
     SurfacePoint point = surface_point(constants, vertices, light.instance, barycentric);
     vec3 offset = point.position - from;
@@ -51,6 +51,7 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     vec3 direction = safe_normalize(offset);
     float distance = dot(offset, direction);
     float cosine = -dot(direction, point.geometric_normal);
+    Material material = load_material(constants, vertices.material);
     if (cosine == 0.0 || !emits_to_side(material, cosine > 0.0)) return NO_LIGHT;
     vec3 emission = material.emission;
     Vertices attributes = interpolate_vertices(constants, vertices.triangle, light.instance, barycentric);
@@ -68,9 +69,9 @@ float triangle_light_pdf(RenderConstants constants, uint light, TriangleId trian
                          vec3 direction, float distance) {
     float pick = light_pick_probability(constants, light);
     float pdf = pick / point.area * (distance * distance) / abs(dot(direction, point.geometric_normal));
-    RelativeTriangle relative = relative_triangle(constants, load_triangle(triangle.slot), triangle.instance, from);
-    if (HAS_NEAR_LAMPS && triangle_is_near(relative)) {
-        float solid_angle = triangle_solid_angle(relative);
+    if (HAS_NEAR_LAMPS) {
+        RelativeTriangle relative = relative_triangle(constants, load_triangle(triangle.slot), triangle.instance, from);
+        float solid_angle = triangle_is_near(relative) ? triangle_solid_angle(relative) : 0.0;
         if (solid_angle > 0.0) pdf = pick / solid_angle;
     }
     return pdf;
