@@ -3,27 +3,39 @@
 #ifndef CDF_GLSL
 #define CDF_GLSL
 #include "arrays.glsl"
+#include "math.glsl"
 
 struct CdfSample {
     uint index;
     float probability;
+    uint offset;  // which of the bin's counts
+    uint count;   // of how many
 };
 
+float cdf_probability(uint count) { return float(count) * (1.0 / 2147483648.0); }
+
+// Where in its bin a sample lies, the digits below its count being `bits`: uniform in [0, 1), whatever the bin.
+float cdf_rest(CdfSample s, uint bits) {
+    float digits = float(bits >> 8u) * 5.9604644775390625e-8;
+    return min((float(s.offset) + digits) / float(s.count), LARGEST_BELOW_1);
+}
+
 // The last of the n bins that starts at or below x; a bin of probability 0 is never it.
-#define DEFINE_CDF(name)                                                                     \
-    float cdf_probability_##name(uint first_word, uint index) {                              \
-        uint count = LOAD1(name, first_word + index + 1u) - LOAD1(name, first_word + index); \
-        return float(count) * (1.0 / 2147483648.0);                                          \
-    }                                                                                        \
-    CdfSample cdf_sample_##name(uint first_word, uint n, uint bits) {                        \
-        uint x = bits >> 1u;                                                                 \
-        uint low = 0u;                                                                       \
-        uint high = n;                                                                       \
-        while (high - low > 1u) {                                                            \
-            uint middle = (low + high) >> 1u;                                                \
-            if (LOAD1(name, first_word + middle) <= x) low = middle; else high = middle;     \
-        }                                                                                    \
-        return CdfSample(low, cdf_probability_##name(first_word, low));                      \
+#define DEFINE_CDF(name)                                                                                \
+    float cdf_probability_##name(uint first_word, uint index) {                                         \
+        return cdf_probability(LOAD1(name, first_word + index + 1u) - LOAD1(name, first_word + index)); \
+    }                                                                                                   \
+    CdfSample cdf_sample_##name(uint first_word, uint n, uint bits) {                                   \
+        uint x = bits >> 1u;                                                                            \
+        uint low = 0u;                                                                                  \
+        uint high = n;                                                                                  \
+        while (high - low > 1u) {                                                                       \
+            uint middle = (low + high) >> 1u;                                                           \
+            if (LOAD1(name, first_word + middle) <= x) low = middle; else high = middle;                \
+        }                                                                                               \
+        uint start = LOAD1(name, first_word + low);                                                     \
+        uint count = LOAD1(name, first_word + low + 1u) - start;                                        \
+        return CdfSample(low, cdf_probability(count), x - start, count);                                \
     }
 
 DEFINE_CDF(TABLES)

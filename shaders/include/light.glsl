@@ -1,10 +1,11 @@
-// Sampling of lights: one is picked by the CDF over their power, then a point or direction of it.
+// Sampling of lights: one is picked by the tree over them or by a table, then a point or direction of it.
 #ifndef LIGHT_GLSL
 #define LIGHT_GLSL
 #include "alpha.glsl"
 #include "cdf.glsl"
 #include "environment.glsl"
 #include "geometry.glsl"
+#include "light_bvh.glsl"
 #include "texture.glsl"
 
 struct LightSample {
@@ -18,8 +19,30 @@ const LightSample NO_LIGHT = LightSample(vec3(0.0), 0.0, vec3(0.0), 0.0, NO_TRIA
 
 bool scene_has_lights() { return LIGHTS != 0u; }
 
-float light_pick_probability(RenderConstants constants, uint light) {
-    return cdf_probability_TABLES(constants.light_cdf_word, light);
+// Lights without a place are not in the tree.
+const bool ONLY_NEAR_LIGHTS = (LIGHTS & (1u << LIGHT_DIRECTIONAL | 1u << LIGHT_ENVIRONMENT)) == 0u;
+
+// The light that `bits` fall to, NONE if none. The table's last bin stands for the tree, if there is one.
+CdfSample light_pick(RenderConstants constants, LightReceiver receiver, uint bits) {
+    if (!HAS_LIGHT_BVH) return cdf_sample_TABLES(constants.light_cdf_word, constants.light_count, bits);
+    uint far = CDF_TOTAL - constants.light_bvh_counts;
+    uint x = bits >> 1u;
+    if (ONLY_NEAR_LIGHTS || x >= far) return light_bvh_sample(constants, receiver, x - far);
+    CdfSample pick = cdf_sample_TABLES(constants.light_cdf_word, constants.light_count - constants.near_lights, bits);
+    pick.index += constants.near_lights;
+    return pick;
+}
+
+// Probability with which light_pick picks a light.
+float light_pick_probability(RenderConstants constants, LightReceiver receiver, uint light) {
+    if (!HAS_LIGHT_BVH) return cdf_probability_TABLES(constants.light_cdf_word, light);
+    if (ONLY_NEAR_LIGHTS || light < constants.near_lights) return light_bvh_probability(constants, receiver, light);
+    return cdf_probability_TABLES(constants.light_cdf_word, light - constants.near_lights);
+}
+
+// The same for a light that is known to have no place: the receiver does not matter.
+float far_light_pick_probability(RenderConstants constants, uint light) {
+    return cdf_probability_TABLES(constants.light_cdf_word, HAS_LIGHT_BVH ? light - constants.near_lights : light);
 }
 
 // Emission of a triangle towards a direction on its front (`front`) or back.
@@ -52,9 +75,10 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
                        TriangleId(light.slot, light.instance));
 }
 
-// Density with which light sampling from `distance` away along unit `direction` draws the point.
-float triangle_light_pdf(RenderConstants constants, uint light, SurfacePoint point, vec3 direction, float distance) {
-    return light_pick_probability(constants, light) / point.area * (distance * distance) /
+// Density with which light sampling at the receiver, from `distance` away along unit `direction`, draws the point.
+float triangle_light_pdf(RenderConstants constants, LightReceiver receiver, uint light, SurfacePoint point,
+                         vec3 direction, float distance) {
+    return light_pick_probability(constants, receiver, light) / point.area * (distance * distance) /
            abs(dot(direction, point.geometric_normal));
 }
 
@@ -70,12 +94,17 @@ LightSample sample_positional_light(Light light, vec3 from, float pick) {
     return LightSample(direction, distance, intensity / (distance * distance) / pick, 0.0, NO_TRIANGLE);
 }
 
-// `bits`: which light, position u, v. `environment_bits`: see environment_sample.
-LightSample sample_light(RenderConstants constants, vec3 from, uvec3 bits, uvec4 environment_bits) {
-    CdfSample pick = cdf_sample_TABLES(constants.light_cdf_word, constants.light_count, bits.x);
+// `bits`: which light, digits below it, position v: the position's u is where in the light's bin the first number falls.
+// `environment_bits`: see environment_sample.
+LightSample sample_light(RenderConstants constants, LightReceiver receiver, uvec3 bits, uvec4 environment_bits) {
+    CdfSample pick = light_pick(constants, receiver, bits.x);
+    if (HAS_LIGHT_BVH && pick.index == NONE) return NO_LIGHT;
+    vec3 from = receiver.point;
     Light light = load_light(constants, pick.index);
-    if (HAS_LIGHT(LIGHT_TRIANGLE) && light.kind == LIGHT_TRIANGLE)
-        return sample_triangle_light(constants, light, from, vec2(to_unit(bits.y), to_unit(bits.z)), pick.probability);
+    if (HAS_LIGHT(LIGHT_TRIANGLE) && light.kind == LIGHT_TRIANGLE) {
+        vec2 u = vec2(cdf_rest(pick, bits.y), to_unit(bits.z));
+        return sample_triangle_light(constants, light, from, u, pick.probability);
+    }
     if (HAS_LIGHT(LIGHT_ENVIRONMENT) && light.kind == LIGHT_ENVIRONMENT) {
         EnvironmentSample s = environment_sample(constants, environment_bits);
         float pdf = s.pdf * pick.probability;

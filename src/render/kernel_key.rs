@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, Settings};
 use crate::gpu::{ArrayForm, TraceBackend};
-use crate::prepare::{EnvironmentKind, Features, Prepared};
+use crate::prepare::{EnvironmentKind, Features, LightChoice, Prepared};
 use crate::scene::{Camera, Projection};
 
 /// Version of the BVH's node layout; part of the key.
@@ -100,6 +100,7 @@ impl KernelKey {
             (7, self.mis_heuristic as u32),
             (8, self.env_sampling as u32),
             (9, self.stack_size),
+            (11, u32::from(f.light_choice == LightChoice::Bvh)),
         ]
     }
 }
@@ -112,6 +113,7 @@ impl fmt::Display for KernelKey {
             self.trace, self.array_form, self.chunk_shift, self.stack_size
         )?;
         write!(f, " {} {} {} {}", self.integrator, self.light_sampling, self.mis_heuristic, self.env_sampling)?;
+        write!(f, " lights:{}", self.features.light_choice)?;
         write!(f, " [{}]", self.features.kept().join(" "))?;
         if self.lens {
             f.write_str(" lens")?;
