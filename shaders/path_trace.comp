@@ -66,7 +66,7 @@ void add_environment(inout LaneState lane) {
     vec4 light = environment_radiance_and_pdf(constants, lane.ray.direction);
     float pdf = 0.0;
     if (HAS_LIGHT(LIGHT_ENVIRONMENT) && constants.environment_light != NONE && lane.emission_weight != WEIGHT_FULL)
-        pdf = light.w * light_pick_probability(constants, constants.environment_light);
+        pdf = light.w * far_light_pick_probability(constants, constants.environment_light);
     add_radiance(lane, lane.bounce, lane.throughput * light.rgb * emission_weight(lane, pdf));
 }
 
@@ -74,7 +74,7 @@ void add_emission(inout LaneState lane, Surface surface, Hit hit) {
     if (max_component(surface.emission) <= 0.0) return;
     float pdf = 0.0;
     if (HAS_LIGHT(LIGHT_TRIANGLE) && surface.light != NONE && lane.emission_weight != WEIGHT_FULL)
-        pdf = triangle_light_pdf(constants, surface.light, hit.triangle, surface.point, lane.ray.origin, lane.ray.direction,
+        pdf = triangle_light_pdf(constants, lane.receiver, surface.light, hit.triangle, surface.point, lane.ray.direction,
                                  hit.t);
     add_radiance(lane, lane.bounce, lane.throughput * surface.emission * emission_weight(lane, pdf));
 }
@@ -88,7 +88,9 @@ bool sample_direct_light(inout LaneState lane, Surface surface, vec3 wo, Triangl
     if (HAS_LIGHT(LIGHT_ENVIRONMENT)) environment_bits = sample_bits(key, lane.bounce, DIMENSIONS_ENVIRONMENT);
     // Above the surface, unless light can come through: then its side is known once the light is.
     vec3 origin = scattered_origin(surface, false);
-    LightSample light = sample_light(constants, origin, bits.xyz, environment_bits);
+    LightReceiver receiver = light_receiver(surface, origin);
+    if (HAS_LIGHT_BVH || HAS_NEAR_LAMPS) lane.receiver = receiver;
+    LightSample light = sample_light(constants, receiver, bits.xyz, environment_bits);
     if (max_component(light.radiance) <= 0.0) return false;
     bool through = bsdf_transmits(surface.bsdf) && dot(light.direction, surface.side_normal) < 0.0;
     if (!through && dot(light.direction, surface.horizon) <= 0.0) return false;

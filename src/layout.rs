@@ -292,7 +292,8 @@ pub const LIGHT_DIRECTIONAL: u32 = 3;
 /// [`Light`] `kind`: the environment.
 pub const LIGHT_ENVIRONMENT: u32 = 4;
 
-/// A light that can be sampled. Lights are picked by the CDF at `light_cdf_word`.
+/// A light that can be sampled. Lights are picked by the CDF at `light_cdf_word`; with a light BVH its bins are the lights
+/// without a place, which come last, then the tree.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Light {
@@ -312,12 +313,43 @@ pub struct Light {
     pub cone_scale: f32,
     /// See `cone_scale`.
     pub cone_offset: f32,
+    /// The way to its leaf in the light BVH: two bits a node, the root's lowest.
+    pub trail: u32,
     /// Unused, zero.
-    pub unused: [u32; 2],
+    pub unused: u32,
 }
 
 /// Texels a light takes.
 pub const LIGHT_TEXELS: u32 = 4;
+
+/// A node of the light BVH: its four children, structure by structure.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightNode {
+    /// Centres of spheres around the lights (rebased world space).
+    pub x: [f32; 4],
+    /// See `x`.
+    pub y: [f32; 4],
+    /// See `x`.
+    pub z: [f32; 4],
+    /// Their radii, > 0.
+    pub radius: [f32; 4],
+    /// The upper half of the f32 of the largest intensity to any direction, relative to all lights'; below it the sines of
+    /// half the angles by which normals lie off the axis (8 bits, of 255) and by which light lies off a normal (7 bits, of
+    /// 127), and a bit that is set if light also goes the other way. All rounded up.
+    pub cones: [u32; 4],
+    /// Axis of the normals: x and y on the octahedron |x| + |y| + |z| = 1 in 16 bits each, of 32767, x the lower.
+    pub axes: [u32; 4],
+    /// Number of the child's node, or [`LIGHT_BVH_LEAF`] and its light.
+    pub children: [u32; 4],
+    /// How many lights the child has; 0 if there is no child.
+    pub lights: [u32; 4],
+}
+
+/// Texels a node of the light BVH takes.
+pub const LIGHT_BVH_TEXELS: u32 = 8;
+/// [`LightNode::children`]: it is a light.
+pub const LIGHT_BVH_LEAF: u32 = 1 << 31;
 
 /// A placed mesh.
 #[repr(C)]
@@ -416,6 +448,14 @@ pub struct RenderConstants {
     pub scene_center: [f32; 3],
     /// Sine of the environment's rotation about +Y.
     pub environment_sin: f32,
+    /// First texel of the light BVH in [`SceneArray::Tables`], if lights are chosen by one.
+    pub light_bvh: u32,
+    /// Its share of the [`CDF_TOTAL`] counts, 0 without one.
+    pub light_bvh_counts: u32,
+    /// Lights in it: those with a place, which come first.
+    pub near_lights: u32,
+    /// Unused, zero.
+    pub unused: u32,
 }
 
 /// What a dispatch does: lanes `0..lanes` render the atoms (block `first_block` + a / pixels, pixel a mod pixels) with
@@ -463,4 +503,4 @@ pub struct BlockResult {
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
-pub const LANE_STATE_BYTES: usize = 240;
+pub const LANE_STATE_BYTES: usize = 272;

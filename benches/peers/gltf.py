@@ -1,7 +1,11 @@
-"""Writes a scene of scenes.py as one .gltf with one .bin beside it (and the environment as .hdr): Sunfleck's side."""
+"""Writes a scene of scenes.py as one .gltf with one .bin beside it (and the environment as .hdr): Sunfleck's side.
+
+    gltf.py SCENE FOLDER [NUMBER]     NUMBER: of lamps that are on, for the scene `emitters`
+"""
 
 import json
 import math
+import sys
 from pathlib import Path
 
 import numpy
@@ -69,3 +73,9 @@ def write_gltf(scene, folder: Path) -> Path:
     path = folder / f"{scene.name}.gltf"
     path.write_text(json.dumps(document))
     return path
+
+
+if __name__ == "__main__":
+    from scenes import SCENES
+
+    print(write_gltf(SCENES[sys.argv[1]](*map(int, sys.argv[3:])), Path(sys.argv[2])))

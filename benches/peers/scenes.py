@@ -207,4 +207,41 @@ def lights() -> Scene:
     return scene
 
 
-SCENES = {make.__name__: make for make in (cornell, plates, sun, caustic, lights, million)}
+def emitters(lit=10_000) -> Scene:
+    """A hall of 40 × 40 m with square lamps everywhere in the air, their powers spread over three decades, among posts and
+    screens that hide them. Every lamp's front turns away from the camera: the edges of the lamps themselves, which no
+    choice of light can help, stay out of the error. Of the 10,000 lamps `lit` are on."""
+    count = 10_000
+    random = numpy.random.default_rng(2)
+    position = numpy.array([4, 3.6, 18.5])
+    scene = Scene("emitters", "Ten thousand emitters", tuple(position.tolist()), (1, 1.0, 4), 50, 4)
+    wall = Material("wall", colour=(0.6, 0.6, 0.6))
+    for centre, turn, half in (((0, 0, 0), rotation("x", -90), (20, 20)), ((0, 6, 0), rotation("x", 90), (20, 20)),
+                               ((0, 3, -20), numpy.eye(3), (20, 3)), ((0, 3, 20), rotation("y", 180), (20, 3)),
+                               ((20, 3, 0), rotation("y", -90), (20, 3)), ((-20, 3, 0), rotation("y", 90), (20, 3))):
+        scene.add(wall, rectangle(centre, turn, half))
+    post = Material("post", colour=(0.3, 0.35, 0.5))
+    screen = Material("screen", colour=(0.6, 0.45, 0.3))
+    for x in range(-16, 17, 8):
+        for z in range(-16, 17, 8):
+            scene.add(post, box((x, 3, z), (0.4, 3, 0.4), 15 * (x + z)))
+            scene.add(screen, box((x + 4, 1.1, z + 1), (2.2, 1.1, 0.1), 7 * x - 5 * z))
+    shades = numpy.array([[1.0, 0.8, 0.6], [0.6, 0.8, 1.0], [1.0, 0.5, 0.5], [0.6, 1.0, 0.6]])
+    groups: dict = {}
+    for index in range(count):
+        centre = random.uniform((-19.5, 0.5, -19.5), (19.5, 5.8, 19.5))
+        turn = rotation("y", random.uniform(0, 360)) @ rotation("x", random.uniform(-90, 90))
+        if turn[:, 2] @ (position - centre) > 0:
+            turn = turn @ rotation("y", 180)
+        step, shade = index // 4 % 25, index % 4
+        key = (step, shade) if index * lit // count != (index - 1) * lit // count else (-1, 0)
+        groups.setdefault(key, []).append(rectangle(centre, turn, (0.03, 0.03)))
+    for (step, shade), quads in sorted(groups.items()):
+        radiance = 0.4 * 1000 ** (step / 24) * shades[shade] * (count / lit) if step >= 0 else numpy.zeros(3)
+        lamp = Material(f"lamp {step} {shade}", colour=(0, 0, 0), emission=tuple(radiance.tolist()))
+        scene.add(lamp, (numpy.concatenate([q[0] for q in quads]),
+                         numpy.concatenate([numpy.array(q[1]) + 4 * k for k, q in enumerate(quads)])))
+    return scene
+
+
+SCENES = {make.__name__: make for make in (cornell, plates, sun, caustic, lights, emitters, million)}

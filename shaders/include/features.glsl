@@ -12,6 +12,7 @@ layout(constant_id = 7) const uint MIS_HEURISTIC = 1u;
 layout(constant_id = 8) const uint ENVIRONMENT_SAMPLING = 0u;
 layout(constant_id = 9) const uint STACK_SIZE = 64u;
 layout(constant_id = 10) const uint SAMPLER = 0u;
+layout(constant_id = 11) const uint LIGHT_CHOICE = 1u;
 
 const bool HAS_TEXTURES = (FEATURES & 1u) != 0u;
 const bool HAS_INSTANCES = (FEATURES & 2u) != 0u;
@@ -47,6 +48,10 @@ const uint LIGHT_SAMPLING_BSDF = 3u;
 const uint SAMPLER_INDEPENDENT = 0u;
 const uint SAMPLER_SOBOL = 1u;
 const uint SAMPLER_SOBOL_REPLICATES = 2u;
+
+const uint LIGHT_CHOICE_TABLE = 0u;
+const uint LIGHT_CHOICE_BVH = 1u;
+const bool HAS_LIGHT_BVH = LIGHT_CHOICE == LIGHT_CHOICE_BVH;
 
 const uint MIS_BALANCE = 0u;
 const uint MIS_POWER = 1u;

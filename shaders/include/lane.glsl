@@ -1,6 +1,7 @@
 // The state of a lane: its path, and the sums of its block. It survives a dispatch.
 #ifndef LANE_GLSL
 #define LANE_GLSL
+#include "light_bvh.glsl"
 #include "media.glsl"
 #include "ray_cone.glsl"
 
@@ -33,6 +34,7 @@ struct LaneState {
     vec3 compensation;
     uint samples;
     RayCone cone;          // of the path's ray, or after the shadow ray of the scattered one
+    LightReceiver receiver; // the last vertex, as light sampling saw it
     Media media;           // that the path's ray, or after the shadow ray the scattered one, is in
 };
 
@@ -75,6 +77,7 @@ LaneState new_lane(RenderConstants constants, SliceConstants slice, uint index) 
     lane.compensation = vec3(0.0);
     lane.samples = 0u;
     lane.cone = RayCone(0.0, 0.0);
+    lane.receiver = LightReceiver(vec3(0.0), 0.0, vec3(0.0));
     lane.media = OUTSIDE;
     return lane;
 }

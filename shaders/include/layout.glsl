@@ -52,6 +52,8 @@ const uint LIGHT_SPOT = 2u;
 const uint LIGHT_DIRECTIONAL = 3u;
 const uint LIGHT_ENVIRONMENT = 4u;
 const uint LIGHT_TEXELS = 4u;
+const uint LIGHT_BVH_TEXELS = 8u;
+const uint LIGHT_BVH_LEAF = 0x80000000u;
 
 const uint INSTANCE_TEXELS = 7u;
 const uint CDF_TOTAL = 0x80000000u;
@@ -94,6 +96,10 @@ struct RenderConstants {
     float environment_cos;
     vec3 scene_center;
     float environment_sin;
+    uint light_bvh;
+    uint light_bvh_counts;
+    uint near_lights;
+    uint unused;
 };
 
 struct SliceConstants {

@@ -1,10 +1,11 @@
-// Sampling of lights: one is picked by the CDF over their power, then a point or direction of it.
+// Sampling of lights: one is picked by the tree over them or by a table, then a point or direction of it.
 #ifndef LIGHT_GLSL
 #define LIGHT_GLSL
 #include "alpha.glsl"
 #include "cdf.glsl"
 #include "environment.glsl"
 #include "geometry.glsl"
+#include "light_bvh.glsl"
 #include "light_triangle.glsl"
 #include "texture.glsl"
 
@@ -19,8 +20,30 @@ const LightSample NO_LIGHT = LightSample(vec3(0.0), 0.0, vec3(0.0), 0.0, NO_TRIA
 
 bool scene_has_lights() { return LIGHTS != 0u; }
 
-float light_pick_probability(RenderConstants constants, uint light) {
-    return cdf_probability_TABLES(constants.light_cdf_word, light);
+// Lights without a place are not in the tree.
+const bool ONLY_NEAR_LIGHTS = (LIGHTS & (1u << LIGHT_DIRECTIONAL | 1u << LIGHT_ENVIRONMENT)) == 0u;
+
+// The light that `bits` fall to, NONE if none. The table's last bin stands for the tree, if there is one.
+CdfSample light_pick(RenderConstants constants, LightReceiver receiver, uint bits) {
+    if (!HAS_LIGHT_BVH) return cdf_sample_TABLES(constants.light_cdf_word, constants.light_count, bits);
+    uint far = CDF_TOTAL - constants.light_bvh_counts;
+    uint x = bits >> 1u;
+    if (ONLY_NEAR_LIGHTS || x >= far) return light_bvh_sample(constants, receiver, x - far);
+    CdfSample pick = cdf_sample_TABLES(constants.light_cdf_word, constants.light_count - constants.near_lights, bits);
+    pick.index += constants.near_lights;
+    return pick;
+}
+
+// Probability with which light_pick picks a light.
+float light_pick_probability(RenderConstants constants, LightReceiver receiver, uint light) {
+    if (!HAS_LIGHT_BVH) return cdf_probability_TABLES(constants.light_cdf_word, light);
+    if (ONLY_NEAR_LIGHTS || light < constants.near_lights) return light_bvh_probability(constants, receiver, light);
+    return cdf_probability_TABLES(constants.light_cdf_word, light - constants.near_lights);
+}
+
+// The same for a light that is known to have no place: the receiver does not matter.
+float far_light_pick_probability(RenderConstants constants, uint light) {
+    return cdf_probability_TABLES(constants.light_cdf_word, HAS_LIGHT_BVH ? light - constants.near_lights : light);
 }
 
 // Emission of a triangle towards a direction on its front (`front`) or back.
@@ -64,13 +87,14 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
                        TriangleId(light.slot, light.instance));
 }
 
-// Density with which light sampling from `from` draws the point of a triangle, `distance` away along unit `direction`.
-float triangle_light_pdf(RenderConstants constants, uint light, TriangleId triangle, SurfacePoint point, vec3 from,
-                         vec3 direction, float distance) {
-    float pick = light_pick_probability(constants, light);
+// Density with which light sampling at the receiver draws the point of a triangle, `distance` away along unit `direction`.
+float triangle_light_pdf(RenderConstants constants, LightReceiver receiver, uint light, TriangleId triangle,
+                         SurfacePoint point, vec3 direction, float distance) {
+    float pick = light_pick_probability(constants, receiver, light);
     float pdf = pick / point.area * (distance * distance) / abs(dot(direction, point.geometric_normal));
     if (HAS_NEAR_LAMPS) {
-        RelativeTriangle relative = relative_triangle(constants, load_triangle(triangle.slot), triangle.instance, from);
+        TriangleVertices vertices = load_triangle(triangle.slot);
+        RelativeTriangle relative = relative_triangle(constants, vertices, triangle.instance, receiver.point);
         float solid_angle = triangle_is_near(relative) ? triangle_solid_angle(relative) : 0.0;
         if (solid_angle > 0.0) pdf = pick / solid_angle;
     }
@@ -91,8 +115,10 @@ LightSample sample_positional_light(Light light, vec3 from, float pick) {
 
 // `bits`: which light, digits below it, position v: the position's u is where in the light's bin the first number falls.
 // `environment_bits`: see environment_sample.
-LightSample sample_light(RenderConstants constants, vec3 from, uvec3 bits, uvec4 environment_bits) {
-    CdfSample pick = cdf_sample_TABLES(constants.light_cdf_word, constants.light_count, bits.x);
+LightSample sample_light(RenderConstants constants, LightReceiver receiver, uvec3 bits, uvec4 environment_bits) {
+    CdfSample pick = light_pick(constants, receiver, bits.x);
+    if (HAS_LIGHT_BVH && pick.index == NONE) return NO_LIGHT;
+    vec3 from = receiver.point;
     Light light = load_light(constants, pick.index);
     if (HAS_LIGHT(LIGHT_TRIANGLE) && light.kind == LIGHT_TRIANGLE) {
         vec2 u = vec2(cdf_rest(pick, bits.y), to_unit(bits.z));

@@ -175,6 +175,14 @@ vec3 scattered_origin(Surface s, bool through) {
     return offset_origin(point, through ? -s.side_normal : s.side_normal);
 }
 
+// What choosing a light goes by. The BSDF's cosine is that about the frame's normal n, which may lie off the horizon's h by
+// an angle δ: |cos θn| ≤ cos θh·cos δ + sin θh·sin δ ≤ cos θh + sin δ. Light that comes through arrives from everywhere.
+LightReceiver light_receiver(Surface s, vec3 origin) {
+    if (bsdf_transmits(s.bsdf)) return LightReceiver(origin, 1.0, vec3(0.0));
+    float slack = HAS_SHADING_NORMALS ? length(cross(s.frame.normal, s.horizon)) : 0.0;
+    return LightReceiver(origin, slack, s.horizon);
+}
+
 // The triangle that a scattered ray cannot hit: its own, unless it leaves above the triangle and goes below.
 TriangleId scattered_from(Surface s, TriangleId own, vec3 direction, bool through) {
     return HAS_NORMALS && !through && dot(direction, s.side_normal) < 0.0 ? NO_TRIANGLE : own;

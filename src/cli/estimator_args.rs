@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use sunfleck::render::{
-    DeviceChoice, EnvironmentSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings, TraceChoice,
+    DeviceChoice, EnvironmentSampling, Integrator, LightChoice, LightSampling, MisHeuristic, SamplerKind, Settings,
+    TraceChoice,
 };
 use sunfleck::{Error, Result};
 
@@ -29,6 +30,10 @@ pub(crate) struct EstimatorArgs {
     /// How light is looked for: mis takes two samples, mixture one of the averaged pdf, nee and bsdf one strategy.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<LightSampling>(LightSampling::NAMES), help_heading = "Light transport")]
     light_sampling: LightSampling,
+    /// How a light is picked: by a tree over power, distance and orientation, by power alone, or all alike. A tree takes
+    /// three lights that have a place; with fewer, bvh is power.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<LightChoice>(LightChoice::NAMES), help_heading = "Light transport")]
+    light_choice: LightChoice,
     /// How --light-sampling mis weighs its samples.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<MisHeuristic>(MisHeuristic::NAMES), help_heading = "Light transport")]
     mis: MisHeuristic,
@@ -86,6 +91,7 @@ impl EstimatorArgs {
             ("integrator", self.integrator.name(), default.integrator.name()),
             ("sampler", self.sampler.name(), default.sampler.name()),
             ("light-sampling", self.light_sampling.name(), default.light_sampling.name()),
+            ("light-choice", self.light_choice.name(), default.light_choice.name()),
             ("mis", self.mis.name(), default.mis_heuristic.name()),
             ("env-sampling", self.env_sampling.name(), default.env_sampling.name()),
             ("trace", self.trace.name(), default.trace.name()),
@@ -128,6 +134,7 @@ impl EstimatorArgs {
         settings.integrator = self.integrator;
         settings.sampler = self.sampler;
         settings.light_sampling = self.light_sampling;
+        settings.light_choice = self.light_choice;
         settings.mis_heuristic = self.mis;
         settings.env_sampling = self.env_sampling;
         settings.mip = !self.no_mip;

@@ -206,6 +206,8 @@ fn describe_prepared(prepared: &Prepared) -> Value {
         "placed_triangles": s.placed_triangles,
         "instances": s.instances,
         "lights": s.lights,
+        "light_choice": prepared.features.light_choice.name(),
+        "light_bvh_nodes": s.light_nodes,
         "bvh": {"inner_nodes": s.inner_slots, "depth": s.depth, "sah_cost": s.sah_cost, "build_seconds": s.bvh_seconds},
         "gpu_bytes": s.array_bytes.iter().sum::<u64>(),
         "gpu_bytes_by_array": arrays,
@@ -224,6 +226,12 @@ fn print_prepared(prepared: &Prepared) {
     eprintln!(
         "  BVH          {} triangles, {} shared instances; {} inner nodes, depth {}, SAH cost {:.1}, {:.3} s",
         s.triangles, s.instances, s.inner_slots, s.depth, s.sah_cost, s.bvh_seconds
+    );
+    eprintln!(
+        "  lights       {} sampled, picked by {}{}",
+        s.lights,
+        prepared.features.light_choice,
+        if s.light_nodes > 0 { format!(" of {} nodes", s.light_nodes) } else { String::new() }
     );
     eprintln!("  kernel needs {}", prepared.features.kept().join(", "));
     eprintln!("  left out     {}", prepared.features.dropped().join(", "));

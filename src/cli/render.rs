@@ -179,6 +179,7 @@ mod tests {
             driver: "its driver".to_owned(),
             trace: "bvh".to_owned(),
             kernel_key: "key".to_owned(),
+            light_choice: sunfleck::render::LightChoice::Power,
             features: vec!["mis".to_owned()],
             rays: 100,
             paths: 8,

@@ -30,6 +30,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "integrator": job.settings.integrator.name(),
         "sampler": job.settings.sampler.name(),
         "light_sampling": job.settings.light_sampling.name(),
+        "light_choice": result.light_choice.name(),
         "max_bounces": job.settings.max_bounces,
         "stopped_by": result.stopped_by.to_string(),
         "rays": result.rays,

@@ -1,6 +1,7 @@
 //! What a scene needs: the part of the kernel key that the scene decides. What is not needed is not loaded, not compiled
 //! and not run.
 
+use super::LightChoice;
 use super::environment::EnvironmentKind;
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, LIGHT_DIRECTIONAL,
@@ -14,6 +15,8 @@ pub struct Features {
     pub bsdfs: u32,
     /// Bit `1 << LIGHT_*` for each kind of light that is sampled.
     pub lights: u32,
+    /// How a light is picked.
+    pub light_choice: LightChoice,
     /// Any texture.
     pub textures: bool,
     /// Any texture with a mip chain: paths carry ray cones.
@@ -85,6 +88,7 @@ impl Features {
             ("spot-lights", light(LIGHT_SPOT)),
             ("directional-lights", light(LIGHT_DIRECTIONAL)),
             ("environment-light", light(LIGHT_ENVIRONMENT)),
+            ("light-bvh", self.light_choice == LightChoice::Bvh),
             ("constant-environment", self.environment == EnvironmentKind::Constant),
             ("image-environment", self.environment == EnvironmentKind::Image),
             ("environment-importance", self.environment_importance),

@@ -15,6 +15,8 @@ mod features;
 mod geometry;
 mod ggx;
 mod instances;
+pub mod light_bvh;
+pub mod light_cone;
 mod lights;
 mod materials;
 mod mip;
@@ -56,6 +58,8 @@ pub struct PrepareOptions {
     pub sample_environment: bool,
     /// Makes mip chains, by which textures are looked up as finely as the path that asks needs it.
     pub mip: bool,
+    /// How a light is picked.
+    pub light_choice: LightChoice,
     /// Bakes every instance into the world: more memory, one level of traversal.
     pub bake_instances: bool,
 }
@@ -67,6 +71,7 @@ impl Default for PrepareOptions {
             environment_sampling: EnvironmentSampling::Importance,
             sample_environment: true,
             mip: true,
+            light_choice: LightChoice::default(),
             bake_instances: false,
         }
     }
@@ -79,6 +84,19 @@ named_enum! {
         #[default]
         Importance = "importance",
         /// Evenly over the sphere.
+        Uniform = "uniform",
+    }
+}
+
+named_enum! {
+    /// How a light is picked at a vertex.
+    LightChoice, "light choice" {
+        /// By a tree over the lights that have a place: power, distance and orientation count.
+        #[default]
+        Bvh = "bvh",
+        /// By power, wherever the vertex is.
+        Power = "power",
+        /// All alike.
         Uniform = "uniform",
     }
 }
@@ -185,6 +203,8 @@ pub struct Statistics {
     pub sah_cost: f64,
     /// Lights.
     pub lights: u64,
+    /// Nodes of the light BVH.
+    pub light_nodes: u64,
     /// Bytes of each array.
     pub array_bytes: [u64; SCENE_ARRAYS],
     /// Seconds for placing triangles and building the trees.
@@ -208,8 +228,7 @@ pub fn prepare(scene: &Scene, options: &PrepareOptions) -> Result<Prepared, Prep
     let bvh_seconds = bvh_start.elapsed().as_secs_f64();
     let sampling = if options.sample_environment { options.environment_sampling } else { EnvironmentSampling::Uniform };
     let environment = environment::prepare(&scene.environment, sampling)?;
-    let lights =
-        lights::gather(scene, &geometry, &mut acceleration, &materials, &environment, options.sample_environment)?;
+    let lights = lights::gather(scene, &geometry, &mut acceleration, &materials, &environment, options)?;
     let mut features = pack::features(&geometry, &acceleration, &materials, &textures, &environment, &lights);
     features.near_lamps = lights.kinds() & (1 << crate::layout::LIGHT_TRIANGLE) != 0 && near_lamps::any(scene);
     let mut statistics = pack::statistics(&acceleration, &lights);

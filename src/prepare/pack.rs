@@ -52,6 +52,9 @@ pub(super) fn pack_arrays(
     let vertices = append(&mut attributes, &geometry.attributes.vertices.texels);
     let mut tables = Vec::new();
     let (sin, cos) = environment.rotation_radians.sin_cos();
+    let light_cdf = lights.cdf();
+    let light_bvh_counts =
+        if lights.near_lights() > 0 { super::cdf::count(&light_cdf, light_cdf.len() - 2) } else { 0 };
     let constants = RenderConstants {
         vertices,
         vertex_texels: geometry.attributes.vertices.stride(),
@@ -60,7 +63,7 @@ pub(super) fn pack_arrays(
         textures: append(&mut tables, &textures.headers),
         lights: append(&mut tables, &lights.records),
         instances: append(&mut tables, &acceleration.instances),
-        light_cdf_word: 4 * append(&mut tables, &pack_words(&lights.cdf())),
+        light_cdf_word: 4 * append(&mut tables, &pack_words(&light_cdf)),
         light_count: lights.records.len() as u32,
         environment_light: lights.environment,
         environment_width: environment.width,
@@ -71,6 +74,9 @@ pub(super) fn pack_arrays(
         environment_radiance: environment.radiance,
         environment_cos: cos as f32,
         environment_sin: sin as f32,
+        light_bvh: append(&mut tables, &lights.bvh.nodes),
+        light_bvh_counts,
+        near_lights: lights.near_lights(),
         scene_center: bounds.center().as_vec3().into(),
         ..RenderConstants::default()
     };
@@ -116,6 +122,7 @@ pub(super) fn features(
         vertex_colors: any(TRIANGLE_COLORS),
         environment: environment.kind,
         environment_importance: environment.conditional_word != 0,
+        light_choice: lights.choice,
         ..Features::default()
     };
     materials.add_features(textures, &mut features);
@@ -137,6 +144,7 @@ pub(super) fn statistics(acceleration: &Acceleration, lights: &LightTable) -> St
         depth: world.depth + shared.iter().map(|mesh| mesh.depth).max().unwrap_or(0),
         sah_cost: world.sah_cost,
         lights: lights.records.len() as u64,
+        light_nodes: lights.bvh.nodes.len() as u64,
         ..Statistics::default()
     };
     for (&mesh, bounds) in acceleration.instance_meshes.iter().zip(&acceleration.instance_bounds) {

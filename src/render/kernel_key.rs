@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings};
 use crate::gpu::{ArrayForm, TraceBackend};
-use crate::prepare::{EnvironmentKind, Features, Prepared};
+use crate::prepare::{EnvironmentKind, Features, LightChoice, Prepared};
 use crate::scene::{Camera, Projection};
 
 /// Version of the BVH's node layout; part of the key.
@@ -108,6 +108,7 @@ impl KernelKey {
             (8, self.env_sampling as u32),
             (9, self.stack_size),
             (10, self.sampler as u32 + u32::from(self.replicates)),
+            (11, u32::from(f.light_choice == LightChoice::Bvh)),
         ]
     }
 }
@@ -120,6 +121,7 @@ impl fmt::Display for KernelKey {
             self.trace, self.array_form, self.chunk_shift, self.stack_size
         )?;
         write!(f, " {} {} {} {}", self.integrator, self.light_sampling, self.mis_heuristic, self.env_sampling)?;
+        write!(f, " lights:{}", self.features.light_choice)?;
         write!(f, " [{}]", self.features.kept().join(" "))?;
         if self.sampler != SamplerKind::Independent {
             write!(f, " {}{}", self.sampler, if self.replicates { ":replicates" } else { "" })?;

@@ -31,8 +31,8 @@ pub use settings::{
 
 use crate::film::metadata::{world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective};
 use crate::film::replicates::ReplicateSums;
-pub use crate::prepare::EnvironmentSampling;
 use crate::prepare::{self, PrepareOptions, Prepared};
+pub use crate::prepare::{EnvironmentSampling, LightChoice};
 use crate::scene::{Camera, Projection, Scene};
 use crate::{Error, Result};
 
@@ -45,6 +45,7 @@ pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Res
         camera: camera.camera_to_world.translation,
         environment_sampling: settings.env_sampling,
         mip: settings.mip,
+        light_choice: settings.light_choice,
         ..PrepareOptions::default()
     };
     Ok(prepare::prepare(scene, &options)?)
@@ -116,6 +117,7 @@ pub fn render_on(
         device_reason: open.reason.clone(),
         trace: open.trace.to_string(),
         kernel_key: key.to_string(),
+        light_choice: key.features.light_choice,
         features: key.features.kept().into_iter().map(str::to_owned).collect(),
         rays: run.rays,
         paths: run.paths,

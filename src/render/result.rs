@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::film::Film;
 use crate::film::replicates::ErrorEstimate;
+use crate::prepare::LightChoice;
 
 /// The outcome of a render.
 #[derive(Clone, Debug)]
@@ -24,6 +25,8 @@ pub struct RenderResult {
     pub kernel_key: String,
     /// What the kernel was built with, one name each.
     pub features: Vec<String>,
+    /// How lights were picked: what the settings ask for, unless the scene has too few.
+    pub light_choice: LightChoice,
     /// Rays traced, shadow rays included.
     pub rays: u64,
     /// Paths traced: samples over all pixels.

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::film::Film;
 use crate::named_enum::named_enum;
-use crate::prepare::EnvironmentSampling;
+use crate::prepare::{EnvironmentSampling, LightChoice};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -39,6 +39,8 @@ pub struct Settings {
     pub sampler: SamplerKind,
     /// How light is looked for.
     pub light_sampling: LightSampling,
+    /// How a light is picked at a vertex; a scene of few lights is not given a tree.
+    pub light_choice: LightChoice,
     /// How [`LightSampling::Mis`] weighs its two samples.
     pub mis_heuristic: MisHeuristic,
     /// How directions to an image environment are chosen.
@@ -74,6 +76,7 @@ impl Default for Settings {
             integrator: Integrator::default(),
             sampler: SamplerKind::default(),
             light_sampling: LightSampling::default(),
+            light_choice: LightChoice::default(),
             mis_heuristic: MisHeuristic::default(),
             env_sampling: EnvironmentSampling::default(),
             filter: PixelFilter::default(),

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 use sunfleck::gpu::TraceBackend;
 use sunfleck::layout::RenderConstants;
 use sunfleck::prepare::Prepared;
-use sunfleck::render::FunctionCall;
+use sunfleck::render::{FunctionCall, LightChoice, Settings};
 use sunfleck::scene::{Camera, Projection, Scene, builtin};
 
 use super::gpu;
@@ -31,13 +31,19 @@ impl TestKernel {
 
     /// `shaders/test/<file>` with a scene, whose first camera decides where the rebased space has its zero.
     pub fn with_scene(file: &str, scene: &Scene) -> Self {
-        let (prepared, constants) = gpu::prepared(scene, &gpu::settings(64, 64));
+        Self::with_choice(file, scene, LightChoice::default())
+    }
+
+    /// The same, lights being picked as is said.
+    pub fn with_choice(file: &str, scene: &Scene, light_choice: LightChoice) -> Self {
+        let (prepared, constants) = gpu::prepared(scene, &Settings { light_choice, ..gpu::settings(64, 64) });
+        let by_bvh = prepared.features.light_choice == LightChoice::Bvh;
         Self {
             file: format!("test/{file}"),
             prepared,
             constants,
             trace: TraceBackend::Bvh,
-            specialization: Vec::new(),
+            specialization: vec![(11, by_bvh.into())],
             defines: Vec::new(),
         }
     }

@@ -127,7 +127,7 @@ fn render_constants_fields() -> Vec<Field> {
         camera_forward, vertex_texels, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
         materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
         environment_height, environment_marginal_word, environment_conditional_word, ggx_albedo, environment_radiance,
-        environment_cos, scene_center, environment_sin)
+        environment_cos, scene_center, environment_sin, light_bvh, light_bvh_counts, near_lights, unused)
 }
 
 #[test]
@@ -250,7 +250,7 @@ fn records_survive_the_way_to_the_shader() {
     let outputs = kernel.run(&[[0; 4]], RECORDS, 32);
     for (i, output) in outputs.chunks_exact(32).enumerate() {
         assert_eq!(&output[..8], bytemuck::cast_slice::<_, [u32; 4]>(&[materials[i]]), "material");
-        let light = layout::Light { unused: [0; 2], ..lights[i] };
+        let light = layout::Light { trail: 0, unused: 0, ..lights[i] };
         assert_eq!(&output[8..12], bytemuck::cast_slice::<_, [u32; 4]>(&[light]), "light");
         let header = layout::TextureHeader { unused: 0, ..headers[i] };
         assert_eq!(&output[12..15], bytemuck::cast_slice::<_, [u32; 4]>(&[header]), "texture header");

@@ -9,6 +9,7 @@ use crate::common::kernel::{Random, TestKernel, empty_scene, floats, vector, vec
 use crate::common::statistics::{Estimate, chi_square_test, normal_upper_tail, sidak};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use sunfleck::layout::{self, CDF_TOTAL, LeafSlot, NONE, SceneArray};
+use sunfleck::render::LightChoice;
 use sunfleck::scene::{Environment, Instance, Material, Mesh, Primitive, PunctualKind, PunctualLight, Scene};
 
 /// Level of each test here.
@@ -147,9 +148,9 @@ fn everything() -> Scene {
     scene
 }
 
-/// The kernel with a scene whose environment, if any, is constant.
+/// The kernel with a scene whose environment, if any, is constant; lights are picked by power.
 fn kernel(scene: &Scene) -> TestKernel {
-    TestKernel::with_scene("light.comp", scene).specialize(4, !16)
+    TestKernel::with_choice("light.comp", scene, LightChoice::Power).specialize(4, !16)
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod environment_chi_square;
 mod error_estimate;
 mod furnace;
 mod layout;
+mod light_bvh;
 mod light_sampling;
 mod mip;
 mod mitsuba_bsdfs;

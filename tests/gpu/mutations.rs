@@ -61,6 +61,14 @@ mutations! {
     correlated_dimension: "include/rng.glsl",
         "DIMENSIONS_LIGHT = 3u" => "DIMENSIONS_LIGHT = 2u",
         caught by "sampler::no_two_groups_share_numbers";
+    /// The density of a light that the BSDF found, as if no light stood outside of the tree.
+    forgotten_far_lights: "include/light_bvh.glsl",
+        "return cdf_probability(counts);" => "return float(counts) / float(constants.light_bvh_counts);",
+        caught by "light_bvh::picks_follow_their_probabilities";
+    /// Lamps are thought to shine from their backs.
+    reversed_orientation: "include/light_bvh.glsl",
+        "vec4 cosine = -(x * ax" => "vec4 cosine = (x * ax",
+        caught by "light_bvh::no_light_that_arrives_is_left_out";
     /// A hash whose low bits repeat along the columns of the image.
     weak_hash: "include/rng.glsl",
         "    v ^= v >> 16u;\n    pcg_mix(v);\n    return v;" => "    return v;",

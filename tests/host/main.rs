@@ -14,6 +14,7 @@ mod prepare_alpha;
 mod prepare_bvh;
 mod prepare_environment;
 mod prepare_geometry;
+mod prepare_light_bvh;
 mod prepare_lights;
 mod prepare_support;
 mod scene_assets;

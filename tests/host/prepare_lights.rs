@@ -6,7 +6,7 @@ use crate::prepare_support::*;
 use glam::{DAffine3, DVec3};
 use proptest::prelude::*;
 use sunfleck::layout::*;
-use sunfleck::prepare::{PrepareOptions, Prepared, cdf, prepare, spot_falloff, spot_solid_angle};
+use sunfleck::prepare::{LightChoice, PrepareOptions, Prepared, cdf, prepare, spot_falloff, spot_solid_angle};
 use sunfleck::scene::{
     Bsdf, Environment, Filter, Image, Instance, Material, PunctualKind, PunctualLight, Scene, Texels, Texture,
     TextureBinding, Wrap,
@@ -45,6 +45,10 @@ fn lights(prepared: &Prepared) -> Vec<Light> {
 fn light_cdf(prepared: &Prepared) -> Vec<u32> {
     let words = prepared.arrays[SceneArray::Tables as usize].as_flattened();
     words[prepared.constants.light_cdf_word as usize..][..=prepared.constants.light_count as usize].to_vec()
+}
+
+fn by_power(scene: &Scene) -> Prepared {
+    prepare(scene, &PrepareOptions { light_choice: LightChoice::Power, ..PrepareOptions::default() }).unwrap()
 }
 
 fn leaf(prepared: &Prepared, slot: u32) -> LeafSlot {
@@ -91,7 +95,7 @@ fn instances_have_lights_of_their_own() {
             DVec3::splat(10.0 * s),
         )
     });
-    let prepared = prepared(&lamp_scene(&transforms, emitter([1.0; 3])));
+    let prepared = by_power(&lamp_scene(&transforms, emitter([1.0; 3])));
     let lights = lights(&prepared);
     assert_eq!(lights.len(), 6);
     let table = light_cdf(&prepared);
@@ -127,7 +131,7 @@ fn two_sided_emitters_have_twice_the_power() {
     scene.materials.push(Material { double_sided: true, ..emitter([1.0; 3]) });
     scene.materials.push(Material { double_sided: true, black_back: true, ..emitter([1.0; 3]) });
     scene.meshes[0].primitives = vec![soup(&[UNIT], 1), soup(&[UNIT], 2), soup(&[UNIT], 3)];
-    let table = light_cdf(&prepared(&scene));
+    let table = light_cdf(&by_power(&scene));
     for (bin, expected) in [0.25, 0.5, 0.25].into_iter().enumerate() {
         assert!((cdf::probability(&table, bin) - expected).abs() < 1e-6);
     }
