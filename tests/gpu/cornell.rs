@@ -58,8 +58,9 @@ fn emission_agrees() {
 
 #[test]
 fn one_bounce_agrees() {
+    // Four samples saw nothing of a tile that one in 2,700 samples lights: a mean without a variance, which no test can judge.
     if !short_form() {
-        compare(Some(1), 4);
+        compare(Some(1), 16);
     }
 }
 

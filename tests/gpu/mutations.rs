@@ -73,6 +73,14 @@ mutations! {
     weak_hash: "include/rng.glsl",
         "    v ^= v >> 16u;\n    pcg_mix(v);\n    return v;" => "    return v;",
         caught by "sampler::dimensions_are_uniform_and_independent";
+    /// Pascal's triangle without one of its steps.
+    broken_sobol_pair: "include/sobol.glsl",
+        "j ^= (j >> 2u) & 0x33333333u;" => "",
+        caught by "sobol::powers_of_two_of_samples_are_nets";
+    /// Neighbours have the same points.
+    pixels_alike: "include/sobol.glsl",
+        "i ^= pixel_digits(z);" => "",
+        caught by "sobol::squares_of_pixels_complete_each_other";
     /// The square root of a negative number beyond the critical angle.
     unclamped_cosine: "include/fresnel.glsl",
         "scaled > 0.0 ? sqrt(scaled) / eta : -1.0" => "sqrt(scaled) / eta",
@@ -108,7 +116,7 @@ mutations! {
         caught by "alpha::a_mask_is_the_geometry_cut_out";
     /// Emission met by chance is weighted as if its lamp were the only one.
     pick_left_out: "include/light.glsl",
-        "float pick = light_pick_probability(constants, light);" => "float pick = 1.0;",
+        "float pick = light_pick_probability(constants, receiver, light);" => "float pick = 1.0;",
         caught by "light_sampling::densities_are_per_solid_angle";
     /// A near lamp's solid angle halved where it is met by chance.
     half_the_solid_angle: "include/light_triangle.glsl",
