@@ -4,6 +4,7 @@
 #define CDF_GLSL
 #include "arrays.glsl"
 #include "math.glsl"
+#include "rng.glsl"
 
 struct CdfSample {
     uint index;
@@ -16,8 +17,7 @@ float cdf_probability(uint count) { return float(count) * (1.0 / 2147483648.0); 
 
 // Where in its bin a sample lies, the digits below its count being `bits`: uniform in [0, 1), whatever the bin.
 float cdf_rest(CdfSample s, uint bits) {
-    float digits = float(bits >> 8u) * 5.9604644775390625e-8;
-    return min((float(s.offset) + digits) / float(s.count), LARGEST_BELOW_1);
+    return min((float(s.offset) + to_unit(bits)) / float(s.count), LARGEST_BELOW_1);
 }
 
 // The last of the n bins that starts at or below x; a bin of probability 0 is never it.

@@ -140,8 +140,7 @@ impl PathTracer {
         plan: &RunPlan,
         progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
     ) -> Result<Run> {
-        let estimates = plan.estimate || plan.target_error.is_some();
-        if estimates && self.key.sampler != SamplerKind::Independent && !self.key.replicates {
+        if plan.estimates_error() && self.key.sampler != SamplerKind::Independent && !self.key.replicates {
             return Err(Error::Usage(String::from("the path tracer was not built to estimate its error")));
         }
         self.constants.seed = seed;

@@ -24,6 +24,11 @@ pub struct RunPlan {
 }
 
 impl RunPlan {
+    /// Whether the error is estimated from replicates.
+    pub fn estimates_error(&self) -> bool {
+        self.estimate || self.target_error.is_some()
+    }
+
     /// What the settings ask for.
     pub fn new(settings: &Settings) -> Self {
         Self {
@@ -71,7 +76,7 @@ impl Run {
 
     pub(super) fn new(constants: &RenderConstants, plan: &RunPlan) -> Self {
         let film = Film::new(constants.width, constants.height);
-        let replicates = plan.estimate || plan.target_error.is_some();
+        let replicates = plan.estimates_error();
         Self {
             replicates: replicates.then(|| ReplicateSums::new(film.pixels().len())),
             film,

@@ -273,6 +273,24 @@ impl Estimate {
     }
 }
 
+/// Prints two estimates of each channel of an image, and fails where they are four standard errors apart.
+pub fn assert_agree(what: &str, a: [Estimate; 3], b: [Estimate; 3]) {
+    for (channel, (a, b)) in a.iter().zip(&b).enumerate() {
+        println!(
+            "{what}, channel {channel}: {:.5} ± {:.1e}, {:.5} ± {:.1e}",
+            a.mean,
+            a.standard_error(),
+            b.mean,
+            b.standard_error()
+        );
+        assert!(
+            a.deviation(b) < 4.0,
+            "{what}, channel {channel}: {} standard errors apart: {a:?} {b:?}",
+            a.deviation(b)
+        );
+    }
+}
+
 /// The mean and the variance of numbers that come one after another (Welford 1962).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Accumulator {

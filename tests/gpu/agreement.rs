@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::common::scenes::{all_scenes, scene, short_form};
-use crate::common::statistics::Estimate;
+use crate::common::statistics::{Estimate, assert_agree};
 use crate::common::{gpu, scenes};
 use sunfleck::render::{EnvironmentSampling, LightSampling, MisHeuristic, SamplerKind, Settings};
 use sunfleck::scene::{Environment, Scene};
@@ -16,23 +16,6 @@ fn settings() -> Settings {
 fn mean(scene: &Scene, settings: &Settings) -> [Estimate; 3] {
     let mut tracer = gpu::path_tracer(scene, settings);
     scenes::seeds(&mut tracer, settings, 16, if short_form() { 4 } else { 8 }).image()
-}
-
-fn assert_agree(what: &str, a: [Estimate; 3], b: [Estimate; 3]) {
-    for (channel, (a, b)) in a.iter().zip(&b).enumerate() {
-        println!(
-            "{what}, channel {channel}: {:.5} ± {:.1e}, {:.5} ± {:.1e}",
-            a.mean,
-            a.standard_error(),
-            b.mean,
-            b.standard_error()
-        );
-        assert!(
-            a.deviation(b) < 4.0,
-            "{what}, channel {channel}: {} standard errors apart: {a:?} {b:?}",
-            a.deviation(b)
-        );
-    }
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! The light BVH as the shader walks it: probabilities add up, picks follow them, no light that arrives is left out, and
 //! images are those that other choices of light give.
 
+use crate::common::builder::mean;
+use crate::common::gpu;
 use crate::common::kernel::{Random, TestKernel, empty_scene, vector_texel};
 use crate::common::scenes::{scene, short_form};
-use crate::common::statistics::{Estimate, chi_square_test, sidak};
-use crate::common::{gpu, scenes};
+use crate::common::statistics::{Estimate, assert_agree, chi_square_test, sidak};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use sunfleck::layout::{self, LeafSlot, NONE, SceneArray};
 use sunfleck::render::{LightChoice, LightSampling, Settings};
@@ -313,23 +314,6 @@ fn lit_floor() -> Scene {
     let back = DAffine3::from_translation(DVec3::new(0.0, 0.5, 7.0));
     scene.cameras[0].camera_to_world = back;
     scene
-}
-
-fn mean(scene: &Scene, settings: &Settings, seeds: u32, spp: u32) -> [Estimate; 3] {
-    scenes::seeds(&mut gpu::path_tracer(scene, settings), settings, seeds, spp).image()
-}
-
-fn assert_agree(what: &str, a: [Estimate; 3], b: [Estimate; 3]) {
-    for (channel, (a, b)) in a.iter().zip(&b).enumerate() {
-        println!(
-            "{what}, channel {channel}: {:.5} ± {:.1e}, {:.5} ± {:.1e}",
-            a.mean,
-            a.standard_error(),
-            b.mean,
-            b.standard_error()
-        );
-        assert!(a.deviation(b) < 4.0, "{what}, channel {channel}: {a:?} {b:?}");
-    }
 }
 
 #[test]
