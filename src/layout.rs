@@ -19,7 +19,7 @@ pub type Texel = [u32; 4];
 pub enum SceneArray {
     /// BVH slots: [`InnerSlot`], [`LeafSlot`], [`InstanceSlot`].
     Slots = 0,
-    /// [`Triangle`] records, then [`Vertex`] records.
+    /// [`Triangle`] records or their kinds, then [`Vertex`] records.
     Attributes = 1,
     /// Small tables: materials, texture headers, lights, the light CDF, instances.
     Tables = 2,
@@ -34,20 +34,18 @@ pub const SCENE_ARRAYS: usize = 5;
 /// An array larger than a device's limit is split into at most this many chunks.
 pub const MAX_CHUNKS: usize = 4;
 
-/// Bit of `kind` that marks a triangle.
-pub const SLOT_LEAF: u32 = 1 << 31;
-/// Bit of `kind` that marks an instance.
-pub const SLOT_INSTANCE: u32 = 1 << 30;
-/// Bit of a leaf's `kind`: its material's alpha decides whether a ray meets it.
-pub const SLOT_ALPHA: u32 = 1 << 29;
-/// Bits of a leaf's `kind` that hold the material index.
-pub const SLOT_MATERIAL_MASK: u32 = (1 << 24) - 1;
+/// `kind` of an inner slot. Read as a float it is NaN, which the last word of a [`LeafSlot`] never is.
+pub const SLOT_INNER: u32 = 0xffff_ffff;
+/// `kind` of an instance.
+pub const SLOT_INSTANCE: u32 = 0xffff_fffe;
+/// The least last word of a slot that is no leaf: the bits of −∞, above those of every finite float.
+pub const SLOT_NO_LEAF: u32 = 0xff80_0000;
 /// Slots stand in groups of this many: the children of one inner slot.
 pub const SLOT_GROUP: u32 = 4;
 
 /// An inner node of the four-wide BVH, with its children's boxes quantised to 8 bits on a grid of its own.
 /// Box k spans, on each axis, `origin + lower.k · 2^(e−127)` to `origin + upper.k · 2^(e−127)`, with child k's 8 bits at
-/// bit 8k. An absent child has lower 255 and upper 0, and its slot is an all-zero triangle.
+/// bit 8k. An absent child has lower 255 and upper 0, and its slot is all zero.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct InnerSlot {
@@ -61,22 +59,18 @@ pub struct InnerSlot {
     pub upper: [u32; 3],
     /// The children are slots `4·child_group` to `4·child_group + 3`.
     pub child_group: u32,
-    /// 0.
+    /// [`SLOT_INNER`].
     pub kind: u32,
 }
 
-/// A triangle, three vertices as they are (so that neighbours test a shared edge alike).
+/// One triangle, or two that share an edge and turn the same way: (0, 1, 2) and (0, 2, 3), vertices as they are (so that
+/// neighbours test a shared edge alike). Where there is one, vertex 3 is vertex 0. Its triangles have the numbers
+/// twice its slot and one more.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LeafSlot {
-    /// Vertices, counter-clockwise seen from the front.
-    pub vertices: [[f32; 3]; 3],
-    /// Index of the [`Triangle`] record.
-    pub triangle: u32,
-    /// Index of the light it is ([`NONE`] if it does not emit); in an instanced mesh, relative to the instance's first light.
-    pub light: u32,
-    /// [`SLOT_LEAF`] | [`SLOT_ALPHA`] where it holds | material index.
-    pub kind: u32,
+    /// Vertices, finite, counter-clockwise seen from the front.
+    pub vertices: [[f32; 3]; 4],
 }
 
 /// A placed mesh: traversal goes on at the instance's root with the ray in object space.
@@ -96,23 +90,33 @@ pub struct InstanceSlot {
 /// Texels a slot takes.
 pub const SLOT_TEXELS: u32 = 3;
 
-/// The triangle's vertices carry normals.
-pub const TRIANGLE_NORMALS: u32 = 1;
-/// The triangle's vertices carry texture coordinates.
-pub const TRIANGLE_TEXCOORDS: u32 = 2;
-/// The triangle's vertices carry tangents.
-pub const TRIANGLE_TANGENTS: u32 = 4;
-/// The triangle's vertices carry colours.
-pub const TRIANGLE_COLORS: u32 = 8;
+/// Bit of a triangle's `kind`: its index is that of a light, of which it is the triangle, and whose record has the material;
+/// in an instanced mesh, relative to the instance's first light.
+pub const TRIANGLE_LIGHT: u32 = 1 << 31;
+/// Bit of `kind`: the material's alpha decides whether a ray meets it.
+pub const TRIANGLE_ALPHA: u32 = 1 << 30;
+/// Bit of `kind`: the vertices carry colours.
+pub const TRIANGLE_COLORS: u32 = 1 << 29;
+/// Bit of `kind`: the vertices carry tangents.
+pub const TRIANGLE_TANGENTS: u32 = 1 << 28;
+/// Bit of `kind`: the vertices carry texture coordinates.
+pub const TRIANGLE_TEXCOORDS: u32 = 1 << 27;
+/// Bit of `kind`: the vertices carry normals.
+pub const TRIANGLE_NORMALS: u32 = 1 << 26;
+/// Bits of `kind` that say what the vertices carry.
+pub const TRIANGLE_ATTRIBUTES: u32 = 0x3c00_0000;
+/// Bits of `kind` that hold the index of the material or light.
+pub const TRIANGLE_INDEX_MASK: u32 = (1 << 26) - 1;
 
-/// What shading needs of a triangle beyond its positions.
+/// What shading needs of a triangle beyond its positions, by its number. Where the kernel reads no attributes of vertices
+/// ([`RenderConstants::vertex_texels`] is 0), the `kind`s alone are stored, four a texel.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Triangle {
     /// Indices of [`Vertex`] records.
     pub vertices: [u32; 3],
-    /// `TRIANGLE_*` bits.
-    pub flags: u32,
+    /// `TRIANGLE_*` bits and index.
+    pub kind: u32,
 }
 
 /// Shading attributes of a vertex, in the space of its mesh (world for baked meshes). A scene stores of each vertex
@@ -303,7 +307,7 @@ pub struct Light {
     pub kind: u32,
     /// Radiant intensity or, for a directional light, irradiance.
     pub intensity: [f32; 3],
-    /// Slot of the triangle ([`LIGHT_TRIANGLE`]).
+    /// Number of the triangle ([`LIGHT_TRIANGLE`]), see [`LeafSlot`].
     pub slot: u32,
     /// Direction the light travels (spot, directional), unit.
     pub direction: [f32; 3],
@@ -315,8 +319,8 @@ pub struct Light {
     pub cone_offset: f32,
     /// The way to its leaf in the light BVH: two bits a node, the root's lowest.
     pub trail: u32,
-    /// Unused, zero.
-    pub unused: u32,
+    /// Material of the triangle.
+    pub material: u32,
 }
 
 /// Texels a light takes.

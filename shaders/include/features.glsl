@@ -32,6 +32,9 @@ const bool HAS_VOLUME = (FEATURES & 16384u) != 0u;
 const bool HAS_MIP = (FEATURES & 32768u) != 0u;
 const bool HAS_NEAR_LAMPS = (FEATURES & 65536u) != 0u;
 
+// Whether triangles have records with vertices, or only their kinds.
+const bool HAS_ATTRIBUTES = HAS_NORMALS || HAS_TEXTURES || HAS_NORMAL_MAPS || HAS_ANISOTROPY || HAS_VERTEX_COLORS;
+
 #define HAS_BSDF(kind) ((BSDFS & (1u << (kind))) != 0u)
 #define HAS_LIGHT(kind) ((LIGHTS & (1u << (kind))) != 0u)
 

@@ -5,17 +5,20 @@
 
 const uint NONE = 0xffffffffu;
 
-const uint SLOT_LEAF = 0x80000000u;
-const uint SLOT_INSTANCE = 0x40000000u;
-const uint SLOT_ALPHA = 0x20000000u;
-const uint SLOT_MATERIAL_MASK = 0x00ffffffu;
+const uint SLOT_INNER = 0xffffffffu;
+const uint SLOT_INSTANCE = 0xfffffffeu;
+const uint SLOT_NO_LEAF = 0xff800000u;
 const uint SLOT_GROUP = 4u;
 const uint SLOT_TEXELS = 3u;
 
-const uint TRIANGLE_NORMALS = 1u;
-const uint TRIANGLE_TEXCOORDS = 2u;
-const uint TRIANGLE_TANGENTS = 4u;
-const uint TRIANGLE_COLORS = 8u;
+const uint TRIANGLE_LIGHT = 0x80000000u;
+const uint TRIANGLE_ALPHA = 0x40000000u;
+const uint TRIANGLE_COLORS = 0x20000000u;
+const uint TRIANGLE_TANGENTS = 0x10000000u;
+const uint TRIANGLE_TEXCOORDS = 0x8000000u;
+const uint TRIANGLE_NORMALS = 0x4000000u;
+const uint TRIANGLE_ATTRIBUTES = 0x3c000000u;
+const uint TRIANGLE_INDEX_MASK = 0x03ffffffu;
 
 const uint BSDF_LAMBERTIAN = 0u;
 const uint BSDF_MIRROR = 1u;
@@ -175,6 +178,7 @@ struct Light {
     uint instance;
     float cone_scale;
     float cone_offset;
+    uint material;
 };
 
 #endif

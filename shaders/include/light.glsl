@@ -61,7 +61,7 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     if (HAS_NEAR_LAMPS) {
         RelativeTriangle relative = relative_triangle(constants, vertices, light.instance, from);
         // Beside a lamp, on the wall that it is set in, lanes would wait for nothing.
-        if (triangle_is_near(relative) && emits_to_side(load_material(constants, vertices.material), relative.front)) {
+        if (triangle_is_near(relative) && emits_to_side(load_material(constants, light.material), relative.front)) {
             vec3 s = sample_solid_angle(relative, u);
             solid_angle = s.z;
             if (solid_angle > 0.0) barycentric = s.xy;
@@ -74,10 +74,10 @@ LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 f
     vec3 direction = safe_normalize(offset);
     float distance = dot(offset, direction);
     float cosine = -dot(direction, point.geometric_normal);
-    Material material = load_material(constants, vertices.material);
+    Material material = load_material(constants, light.material);
     if (cosine == 0.0 || !emits_to_side(material, cosine > 0.0)) return NO_LIGHT;
     vec3 emission = material.emission;
-    Vertices attributes = interpolate_vertices(constants, vertices.triangle, light.instance, barycentric);
+    Vertices attributes = interpolate_vertices(constants, light.slot, light.instance, barycentric);
     if (HAS_TEXTURES) emission = material_emission(constants, material, attributes.texcoords);
     // The shadow ray does not ask the triangle that it aims at whether it is there.
     if (HAS_ALPHA) emission *= surface_opacity(constants, material, attributes);

@@ -71,7 +71,14 @@ Light load_light(RenderConstants constants, uint index) {
     light.instance = c.w;
     light.cone_scale = uintBitsToFloat(d.x);
     light.cone_offset = uintBitsToFloat(d.y);
+    light.material = d.w;
     return light;
+}
+
+// A triangle's kind, by its number.
+uint load_triangle_kind(RenderConstants constants, uint number) {
+    if (HAS_ATTRIBUTES && constants.vertex_texels != 0u) return LOAD4(ATTRIBUTES, number).w;
+    return LOAD1(ATTRIBUTES, number);
 }
 
 // A 3×4 affine matrix as three rows.
@@ -101,5 +108,17 @@ vec3 transform_vector(Affine m, vec3 v) { return vec3(dot(m.x.xyz, v), dot(m.y.x
 vec3 transform_point(Affine m, vec3 p) { return transform_vector(m, p) + vec3(m.x.w, m.y.w, m.z.w); }
 // The transpose: carries normals when m is the inverse of the points' transform.
 vec3 transform_transposed(Affine m, vec3 n) { return m.x.xyz * n.x + m.y.xyz * n.y + m.z.xyz * n.z; }
+
+// A triangle's light and material; the light is NONE if it is none.
+struct TriangleLook {
+    uint light;
+    uint material;
+};
+TriangleLook triangle_look(RenderConstants constants, uint kind, uint instance) {
+    uint index = kind & TRIANGLE_INDEX_MASK;
+    if (!HAS_LIGHT(LIGHT_TRIANGLE) || (kind & TRIANGLE_LIGHT) == 0u) return TriangleLook(NONE, index);
+    if (HAS_INSTANCES && instance != NONE) index += load_instance_header(constants, instance).y;
+    return TriangleLook(index, LOAD4(TABLES, constants.lights + index * LIGHT_TEXELS + 3u).w);
+}
 
 #endif

@@ -91,14 +91,16 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo, Media media, flo
     s.point = surface_point(constants, vertices, hit.triangle.instance, hit.barycentric);
     bool front = dot(s.point.geometric_normal, wo) > 0.0;
     s.side_normal = front ? s.point.geometric_normal : -s.point.geometric_normal;
-    Vertices attributes = interpolate_vertices(constants, vertices.triangle, hit.triangle.instance, hit.barycentric);
+    TriangleLook look =
+        triangle_look(constants, load_triangle_kind(constants, hit.triangle.slot), hit.triangle.instance);
+    Vertices attributes = interpolate_vertices(constants, hit.triangle.slot, hit.triangle.instance, hit.barycentric);
     if (HAS_MIP) attributes.footprint = texture_footprint(s.point, attributes, width);
-    Material material = load_material(constants, vertices.material);
+    Material material = load_material(constants, look.material);
     s.bsdf = bsdf_parameters(constants, material, attributes, front);
     s.near = media;
     s.far = media;
     if (HAS_VOLUME && (material.kind_flags & MATERIAL_VOLUME) != 0u)
-        set_media(constants, s, vertices.material, front, media);
+        set_media(constants, s, look.material, front, media);
     Shading shading = shading_at(constants, material, vertices, attributes, s.point, hit, s.side_normal, wo);
     s.frame = shading.frame;
     if (HAS_ANISOTROPY && material.anisotropy > 0.0 && attributes.tangent.w != 0.0)
@@ -114,9 +116,7 @@ Surface surface_at(RenderConstants constants, Hit hit, vec3 wo, Media media, flo
     bsdf_prepare(constants, s.bsdf, to_local(s.frame, wo));
     s.emission = emits_to_side(material, front) ? material_emission(constants, material, attributes.texcoords) : vec3(0.0);
     s.curved = is_curved(material, attributes);
-    s.light = vertices.light;
-    if (HAS_INSTANCES && s.light != NONE && hit.triangle.instance != NONE)
-        s.light += load_instance_header(constants, hit.triangle.instance).y;
+    s.light = look.light;
     s.black = HAS_BLACK_BACKS && !front && (material.kind_flags & MATERIAL_BLACK_BACK) != 0u;
     if (HAS_BSDF(BSDF_UNLIT) && s.bsdf.kind == BSDF_UNLIT) {
         s.emission = s.bsdf.color;

@@ -12,7 +12,8 @@
 #include "layout.glsl"
 #include "math.glsl"
 
-// A triangle of the scene: its slot, and the instance that places it (NONE for baked meshes).
+// A triangle of the scene: its number, which is twice its slot and one more for the second of a slot, and the instance
+// that places it (NONE for baked meshes).
 struct TriangleId {
     uint slot;
     uint instance;

@@ -14,9 +14,11 @@ const uint LEAVE_INSTANCE = 0xffffff80u;
 
 struct Trace {
     vec3 origin;  // the ray in the space of `instance`
-    vec3 direction;
     vec3 inverse_direction;
-    Hit hit;
+    vec3 shear;   // and shear_axis: see visit_leaf
+    uint shear_axis;
+    Hit hit;      // its barycentric weights times `determinant`
+    float determinant;
     uint current;   // slot to visit, NONE when done
     uint instance;  // the instance being traversed, NONE at the world level
     uint top;       // newest entry, 0 if there is none
@@ -62,15 +64,26 @@ vec3 slab_inverse(vec3 d) {
     return vec3(d.x < 0.0 ? -1.0 : 1.0, d.y < 0.0 ? -1.0 : 1.0, d.z < 0.0 ? -1.0 : 1.0) / magnitude;
 }
 
+// v rotated so that component `axis` is the last.
+vec3 rotate_axis(vec3 v, uint axis) { return axis == 0u ? v.yzx : (axis == 1u ? v.zxy : v); }
+
 void set_ray(inout Trace trace, vec3 origin, vec3 direction) {
     trace.origin = origin;
-    trace.direction = direction;
     trace.inverse_direction = slab_inverse(direction);
+    vec3 magnitude = abs(direction);
+    bool x_largest = magnitude.x > magnitude.y && magnitude.x > magnitude.z;
+    trace.shear_axis = x_largest ? 0u : (magnitude.y > magnitude.z ? 1u : 2u);
+    vec3 d = rotate_axis(direction, trace.shear_axis);
+    precise float shear_z = 1.0 / d.z;
+    precise float shear_x = d.x * shear_z;
+    precise float shear_y = d.y * shear_z;
+    trace.shear = vec3(shear_x, shear_y, shear_z);
 }
 
 void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alpha_key) {
     set_ray(trace, ray.origin, ray.direction);
     trace.hit = Hit(NO_TRIANGLE, ray.t_max, vec2(0.0));
+    trace.determinant = 1.0;
     trace.current = ray_is_valid(ray) ? constants.root_slot : NONE;
     trace.instance = NONE;
     trace.top = 0u;
@@ -88,7 +101,7 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alph
 }
 
 bool trace_done(Trace trace) { return trace.current == NONE; }
-Hit trace_hit(Trace trace) { return trace.hit; }
+Hit trace_hit(Trace trace) { return Hit(trace.hit.triangle, trace.hit.t, trace.hit.barycentric / trace.determinant); }
 
 // Child k's byte of a word of bounds, as a float.
 float bound_0(uint word) { return float(word & 255u); }
@@ -155,47 +168,53 @@ void visit_inner(Trace trace, uvec4 q0, uvec4 q1, uvec4 q2, out uint next, out u
     next = key_0 != MISSED ? (q2.z << 2u | uint(key_0 & 3)) : NONE;
 }
 
-// The axis of the largest component, and v rotated so that it is the last.
-vec3 rotate_axis(vec3 v, bool x_largest, bool y_largest) { return x_largest ? v.yzx : (y_largest ? v.zxy : v); }
+// The triangle becomes the hit if the ray meets it before. `edges` are its edge functions, opposite to its vertices in turn,
+// which are the weights of the vertices' sheared `depths` but for a factor.
+void visit_triangle(inout Trace trace, RenderConstants constants, uint number, vec3 edges, vec3 depths) {
+    precise float determinant = edges.x + edges.y + edges.z;
+    precise float scaled_t = (edges.x * depths.x + edges.y * depths.y + edges.z * depths.z) * trace.shear.z;
+    bool inside = all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)));
+    float t = scaled_t / determinant;
+    TriangleId triangle = TriangleId(number, trace.instance);
+    bool excluded = same_triangle(triangle, trace.from) || same_triangle(triangle, trace.towards);
+    // A zero determinant gives an infinite or undefined t, which fails here; that of an absent triangle is zero, see below.
+    if (inside && determinant != 0.0 && t > 0.0 && t < trace.hit.t && !excluded) {
+        if (HAS_ALPHA) {
+            uint kind = load_triangle_kind(constants, number);
+            if ((kind & TRIANGLE_ALPHA) != 0u &&
+                !alpha_hits(constants, trace.alpha_key, triangle_look(constants, kind, trace.instance).material, number,
+                            trace.instance, edges.yz / determinant))
+                return;
+        }
+        trace.hit = Hit(triangle, t, edges.yz);
+        trace.determinant = determinant;
+    }
+}
 
 // Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": vertices are sheared into ray space, each by the
 // same operations wherever it is shared, and edges are tested there by differences of products. Rounding is monotonic, so
 // a computed edge function never has the wrong sign, it can only be zero; zero counts as inside. Hence a closed mesh has
 // no gap. `precise` keeps the compiler from fusing, which would break the symmetry between neighbours.
+//
+// Both triangles of the slot are tested, (a, b, c) and (a, c, d). Their common edge is computed once: the other way round,
+// the difference of the same products has the opposite sign exactly. Where d is a, the second has the edge functions e, 0
+// and −e, whose sum is zero.
 void visit_leaf(inout Trace trace, RenderConstants constants, uvec4 q0, uvec4 q1, uvec4 q2) {
-    vec3 magnitude = abs(trace.direction);
-    bool x_largest = magnitude.x > magnitude.y && magnitude.x > magnitude.z;
-    bool y_largest = !x_largest && magnitude.y > magnitude.z;
-    vec3 d = rotate_axis(trace.direction, x_largest, y_largest);
-    precise float shear_z = 1.0 / d.z;
-    precise float shear_x = d.x * shear_z;
-    precise float shear_y = d.y * shear_z;
-    precise vec3 a = rotate_axis(uintBitsToFloat(q0.xyz) - trace.origin, x_largest, y_largest);
-    precise vec3 b = rotate_axis(uintBitsToFloat(uvec3(q0.w, q1.xy)) - trace.origin, x_largest, y_largest);
-    precise vec3 c = rotate_axis(uintBitsToFloat(uvec3(q1.zw, q2.x)) - trace.origin, x_largest, y_largest);
-    precise float ax = a.x - shear_x * a.z;
-    precise float ay = a.y - shear_y * a.z;
-    precise float bx = b.x - shear_x * b.z;
-    precise float by = b.y - shear_y * b.z;
-    precise float cx = c.x - shear_x * c.z;
-    precise float cy = c.y - shear_y * c.z;
-    precise float u = cx * by - cy * bx;
-    precise float v = ax * cy - ay * cx;
-    precise float w = bx * ay - by * ax;
-    precise float determinant = u + v + w;
-    precise float scaled_t = (u * a.z + v * b.z + w * c.z) * shear_z;
-    bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-    float t = scaled_t / determinant;
-    TriangleId triangle = TriangleId(trace.current, trace.instance);
-    bool excluded = same_triangle(triangle, trace.from) || same_triangle(triangle, trace.towards);
-    // A zero determinant gives an infinite or undefined t, which fails here.
-    if (inside && determinant != 0.0 && t > 0.0 && t < trace.hit.t && !excluded) {
-        vec2 barycentric = vec2(v, w) / determinant;
-        if (HAS_ALPHA && (q2.w & SLOT_ALPHA) != 0u &&
-            !alpha_hits(constants, trace.alpha_key, q2.w & SLOT_MATERIAL_MASK, q2.y, trace.instance, barycentric))
-            return;
-        trace.hit = Hit(triangle, t, barycentric);
-    }
+    precise vec3 a = rotate_axis(uintBitsToFloat(q0.xyz) - trace.origin, trace.shear_axis);
+    precise vec3 b = rotate_axis(uintBitsToFloat(uvec3(q0.w, q1.xy)) - trace.origin, trace.shear_axis);
+    precise vec3 c = rotate_axis(uintBitsToFloat(uvec3(q1.zw, q2.x)) - trace.origin, trace.shear_axis);
+    precise vec3 d = rotate_axis(uintBitsToFloat(q2.yzw) - trace.origin, trace.shear_axis);
+    precise vec2 pa = a.xy - trace.shear.xy * a.z;
+    precise vec2 pb = b.xy - trace.shear.xy * b.z;
+    precise vec2 pc = c.xy - trace.shear.xy * c.z;
+    precise vec2 pd = d.xy - trace.shear.xy * d.z;
+    precise float bc = pc.x * pb.y - pc.y * pb.x;
+    precise float ca = pa.x * pc.y - pa.y * pc.x;
+    precise float ab = pb.x * pa.y - pb.y * pa.x;
+    precise float cd = pd.x * pc.y - pd.y * pc.x;
+    precise float da = pa.x * pd.y - pa.y * pd.x;
+    visit_triangle(trace, constants, 2u * trace.current, vec3(bc, ca, ab), vec3(a.z, b.z, c.z));
+    visit_triangle(trace, constants, 2u * trace.current + 1u, vec3(cd, da, -ca), vec3(a.z, c.z, d.z));
 }
 
 // Continues at the instance's root with the ray in object space; t keeps its meaning since the direction is not rescaled.
@@ -220,10 +239,11 @@ void trace_step(inout Trace trace, RenderConstants constants) {
     uvec4 q0 = LOAD4(SLOTS, base);
     uvec4 q1 = LOAD4(SLOTS, base + 1u);
     uvec4 q2 = LOAD4(SLOTS, base + 2u);
-    bool leaf = (q2.w & SLOT_LEAF) != 0u;
+    // The last word of a leaf is a coordinate, those of the others are NaN.
+    bool leaf = q2.w < SLOT_NO_LEAF;
     uint next = NONE;
     uint entry = 0u;
-    if (HAS_INSTANCES && (q2.w & SLOT_INSTANCE) != 0u) {
+    if (HAS_INSTANCES && q2.w == SLOT_INSTANCE) {
         enter_instance(trace, constants, q2.y);
         return;
     }
@@ -251,7 +271,7 @@ void trace_step(inout Trace trace, RenderConstants constants) {
 }
 
 // Steps until the next look at which lanes are done; more leave finished lanes idle, fewer test too often.
-const int STEPS_PER_ADVANCE = 6;
+const int STEPS_PER_ADVANCE = 10;
 
 void trace_advance(inout Trace trace, RenderConstants constants) {
     for (int i = 0; i < STEPS_PER_ADVANCE; ++i) {

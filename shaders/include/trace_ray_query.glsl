@@ -1,5 +1,5 @@
-// The trace interface over VK_KHR_ray_query. Primitive i of a mesh is slot first + i (inner slots are degenerate
-// triangles there); the instance's custom index is ours, or 0xffffff for the baked mesh.
+// The trace interface over VK_KHR_ray_query. Primitive i of a mesh is triangle 2·first + i (those of slots that are
+// no leaves are degenerate); the instance's custom index is ours, or 0xffffff for the baked mesh.
 #include "alpha.glsl"
 #include "features.glsl"
 #include "records.glsl"
@@ -31,14 +31,14 @@ Hit trace_hit(Trace trace) { return trace.hit; }
 TriangleId query_triangle(RenderConstants constants, uint custom, uint primitive) {
     bool baked = custom == BAKED_INSTANCE;
     uint first = HAS_INSTANCES && !baked ? load_instance_header(constants, custom).x : 0u;
-    return TriangleId(first + primitive, baked ? NONE : custom);
+    return TriangleId(2u * first + primitive, baked ? NONE : custom);
 }
 
 // Whether the ray meets the candidate. Only triangles of surfaces with alpha are candidates; the others are opaque
 // geometry, which the driver commits by itself.
 bool candidate_hits(RenderConstants constants, uvec2 key, TriangleId triangle, vec2 barycentric) {
-    uvec4 q2 = LOAD4(SLOTS, triangle.slot * SLOT_TEXELS + 2u);
-    return alpha_hits(constants, key, q2.w & SLOT_MATERIAL_MASK, q2.y, triangle.instance, barycentric);
+    TriangleLook look = triangle_look(constants, load_triangle_kind(constants, triangle.slot), triangle.instance);
+    return alpha_hits(constants, key, look.material, triangle.slot, triangle.instance, barycentric);
 }
 
 void trace_advance(inout Trace trace, RenderConstants constants) {

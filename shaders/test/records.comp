@@ -25,7 +25,7 @@ void main() {
     outputs[o + 8u] = uvec4(bits(light.position), light.kind);
     outputs[o + 9u] = uvec4(bits(light.intensity), light.slot);
     outputs[o + 10u] = uvec4(bits(light.direction), light.instance);
-    outputs[o + 11u] = uvec4(bits(light.cone_scale), bits(light.cone_offset), 0u, 0u);
+    outputs[o + 11u] = uvec4(bits(light.cone_scale), bits(light.cone_offset), 0u, light.material);
     TextureHeader header = load_texture_header(constants, lane);
     outputs[o + 12u] = uvec4(header.first_word, header.width, header.height, header.sampling);
     outputs[o + 13u] = uvec4(bits(header.u_row), header.mips);
@@ -39,13 +39,15 @@ void main() {
     outputs[o + 19u] = floatBitsToUint(backward.y);
     outputs[o + 20u] = floatBitsToUint(backward.z);
     outputs[o + 21u] = load_instance_header(constants, lane);
-    TriangleVertices t = load_triangle(lane);
-    outputs[o + 22u] = uvec4(bits(t.a), t.triangle);
-    outputs[o + 23u] = uvec4(bits(t.b), t.light);
-    outputs[o + 24u] = uvec4(bits(t.c), t.material);
+    // The first and the second triangle of a slot: their third vertices are the slot's third and fourth.
+    TriangleVertices t = load_triangle(2u * lane);
+    TriangleVertices second = load_triangle(2u * lane + 1u);
+    outputs[o + 22u] = uvec4(bits(t.a), bits(second.c.x));
+    outputs[o + 23u] = uvec4(bits(t.b), bits(second.c.y));
+    outputs[o + 24u] = uvec4(bits(t.c), bits(second.c.z));
     // At a corner the interpolated attributes are those of one vertex.
     Vertices v = interpolate_vertices(constants, lane, NONE, vec2(0.0, 1.0));
-    outputs[o + 25u] = uvec4(bits(v.normal), 0u);
+    outputs[o + 25u] = uvec4(bits(v.normal), load_triangle_kind(constants, lane));
     outputs[o + 26u] = floatBitsToUint(v.texcoords);
     outputs[o + 27u] = floatBitsToUint(v.tangent);
     outputs[o + 28u] = floatBitsToUint(v.color);

@@ -8,7 +8,9 @@ use super::bvh::{self, Primitive, Slot, Tree};
 use super::geometry::{Geometry, SharedMesh};
 use super::instances::Matrices;
 use super::{COORDINATE_LIMIT, PrepareError, PreparedMesh};
-use crate::layout::{InstanceRecord, InstanceSlot, NONE, SLOT_INSTANCE};
+use crate::layout::{
+    InstanceRecord, InstanceSlot, SLOT_INSTANCE, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Triangle,
+};
 
 /// A shared mesh's tree covers itself with this many boxes: rotated, they bound an instance tighter than one would.
 const COVER_BOXES: usize = 64;
@@ -17,6 +19,8 @@ const COVER_BOXES: usize = 64;
 #[derive(Debug)]
 pub(super) struct Acceleration {
     pub(super) slots: Vec<Slot>,
+    /// By their numbers: two a slot, zero where there is none.
+    pub(super) triangles: Vec<Triangle>,
     /// The world, then the shared meshes in order.
     pub(super) meshes: Vec<PreparedMesh>,
     /// Instances of the shared meshes, in order; `first_light` is not set.
@@ -35,6 +39,7 @@ impl Acceleration {
     fn new() -> Self {
         Self {
             slots: Vec::new(),
+            triangles: Vec::new(),
             meshes: Vec::new(),
             instances: Vec::new(),
             instance_meshes: Vec::new(),
@@ -67,7 +72,7 @@ pub(super) fn build(geometry: &mut Geometry, camera: DVec3) -> Result<Accelerati
 }
 
 fn primitives(mesh: &MeshGeometry) -> Vec<Primitive> {
-    mesh.leaves.iter().zip(0..).map(|(leaf, i)| Primitive::new(i, &Bounds::around(leaf.vertices))).collect()
+    mesh.leaves.iter().zip(0..).map(|(leaf, i)| Primitive::new(i, &Bounds::around(leaf.slot.vertices))).collect()
 }
 
 /// Makes the records and the world boxes of all instances.
@@ -77,7 +82,7 @@ fn place_instances(
     trees: &[Tree],
     camera: DVec3,
 ) -> Result<(), PrepareError> {
-    let mut all = Bounds::around(geometry.world.leaves.iter().flat_map(|leaf| leaf.vertices)).to_f64();
+    let mut all = Bounds::around(geometry.world.leaves.iter().flat_map(|leaf| leaf.slot.vertices)).to_f64();
     let mut placed: Vec<(Matrices, DBounds)> = Vec::new();
     for (index, (SharedMesh { placements, .. }, tree)) in geometry.shared.iter().zip(trees).enumerate() {
         let cover = tree.cover(COVER_BOXES);
@@ -111,21 +116,32 @@ fn place_instances(
 fn append(acceleration: &mut Acceleration, tree: &Tree, mesh: &mut MeshGeometry) -> Result<(), PrepareError> {
     let first_slot = acceleration.slots.len() as u32;
     let (leaves, emissive) = (&mesh.leaves, &mut mesh.emissive);
+    let triangles = &mut acceleration.triangles;
+    let mut put = |number: u32, triangle: &Triangle| {
+        if triangles.len() <= number as usize {
+            triangles.resize(number as usize + 1, Triangle::default());
+        }
+        triangles[number as usize] = *triangle;
+        if triangle.kind & TRIANGLE_LIGHT != 0 {
+            emissive[(triangle.kind & TRIANGLE_INDEX_MASK) as usize].slot = number;
+        }
+    };
     let written = tree.append(&mut acceleration.slots, |primitive, slot| {
         let Some(leaf) = leaves.get(primitive as usize) else {
             let instance = primitive - leaves.len() as u32;
             return bytemuck::cast(InstanceSlot { instance, kind: SLOT_INSTANCE, ..InstanceSlot::default() });
         };
-        if leaf.light != NONE {
-            emissive[leaf.light as usize].slot = slot;
+        put(2 * slot, &leaf.first);
+        if let Some(second) = &leaf.second {
+            put(2 * slot + 1, second);
         }
-        bytemuck::cast(*leaf)
+        bytemuck::cast(leaf.slot)
     })?;
     if cfg!(debug_assertions) {
         let valid = bvh::validate(&acceleration.slots, written.root_slot, &acceleration.instance_bounds);
         let expected = tree.leaves();
         match valid {
-            Ok(contents) => assert_eq!(contents.triangle_slots.len() + contents.instance_slots.len(), expected),
+            Ok(contents) => assert_eq!(contents.leaf_slots.len() + contents.instance_slots.len(), expected),
             Err(error) => panic!("the tree of {} is broken: {error}", mesh.name),
         }
     }
@@ -133,7 +149,7 @@ fn append(acceleration: &mut Acceleration, tree: &Tree, mesh: &mut MeshGeometry)
         name: mesh.name.clone(),
         root_slot: written.root_slot,
         slots: first_slot..acceleration.slots.len() as u32,
-        triangles: leaves.len() as u32,
+        triangles: mesh.triangles,
         depth: written.depth,
         inner_slots: written.inner_slots,
         sah_cost: written.sah_cost,

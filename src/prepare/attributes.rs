@@ -6,22 +6,34 @@ use super::coincident::SeenTriangles;
 use super::materials::MaterialTable;
 use super::vertices::Vertices;
 use super::{COORDINATE_LIMIT, PrepareError};
-use crate::layout::{LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, SLOT_ALPHA, SLOT_LEAF, Triangle};
+use super::pairs::{leaf_slot, pairs, turned};
+use crate::layout::{LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, TRIANGLE_ALPHA, TRIANGLE_ATTRIBUTES, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Triangle};
 use crate::scene::Primitive;
 
 /// The records of all meshes.
 #[derive(Debug, Default)]
 pub(super) struct Attributes {
-    pub(super) triangles: Vec<Triangle>,
     pub(super) vertices: Vertices,
+    /// `TRIANGLE_*` bits of what the vertices of some triangle carry.
+    pub(super) flags: u32,
+}
+
+/// What becomes a [`LeafSlot`]: one triangle or two.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaf {
+    pub(super) slot: LeafSlot,
+    pub(super) first: Triangle,
+    pub(super) second: Option<Triangle>,
 }
 
 /// The triangles of one traced mesh: the baked world, or a mesh that instances share.
 #[derive(Debug, Default)]
 pub(super) struct MeshGeometry {
     pub(super) name: String,
-    pub(super) leaves: Vec<LeafSlot>,
-    /// By [`LeafSlot::light`].
+    pub(super) leaves: Vec<Leaf>,
+    /// Triangles in the leaves.
+    pub(super) triangles: u32,
+    /// By the index in the `kind` of those with [`TRIANGLE_LIGHT`].
     pub(super) emissive: Vec<EmissiveTriangle>,
     /// By which those given twice are known.
     pub(super) seen: SeenTriangles,
@@ -34,7 +46,7 @@ pub(super) struct EmissiveTriangle {
     pub(super) material: u32,
     /// Mean over the triangle of the emission's luminance.
     pub(super) mean_luminance: f64,
-    /// Where it is, once the tree is built.
+    /// The triangle's number, once the tree is built.
     pub(super) slot: u32,
 }
 
@@ -58,9 +70,9 @@ pub(super) fn add_primitive(
     let mirrored = transform.matrix3.determinant() < 0.0;
     let map = materials.emission_map(used.record);
     let double_sided = materials.records[used.record as usize].kind_flags & MATERIAL_DOUBLE_SIDED != 0;
-    let kind = SLOT_LEAF | used.record | if used.alpha { SLOT_ALPHA } else { 0 };
-    mesh.leaves.reserve(primitive.triangles.len());
-    attributes.triangles.reserve(primitive.triangles.len());
+    let kind = used.record | if used.alpha { TRIANGLE_ALPHA } else { 0 };
+    let mut kept = Vec::with_capacity(primitive.triangles.len());
+    let mut records = Vec::with_capacity(primitive.triangles.len());
     for &[a, b, c] in &primitive.triangles {
         let corners = if mirrored { [a, c, b] } else { [a, b, c] };
         let vertices = corners.map(|corner| positions[corner as usize]);
@@ -71,21 +83,41 @@ pub(super) fn add_primitive(
         if used.emissive && map.is_none() && !mesh.seen.is_new(vertices, used.record, double_sided) {
             continue;
         }
-        let mut light = NONE;
+        let mut record = attributes.vertices.triangle(stored, corners);
+        record.kind |= kind;
         if used.emissive {
             let mean_luminance = match map {
                 Some(map) => map.mean(corners.map(|corner| texcoord(primitive, map.set, corner))),
                 None => super::luminance(materials.records[used.record as usize].emission),
             } * materials.largest_opacity(used.record);
             if mean_luminance > 0.0 {
-                light = mesh.emissive.len() as u32;
+                let light = mesh.emissive.len() as u32;
+                if light > TRIANGLE_INDEX_MASK {
+                    return Err(PrepareError::TooManyLights);
+                }
+                record.kind = (record.kind & !TRIANGLE_INDEX_MASK) | TRIANGLE_LIGHT | light;
                 mesh.emissive.push(EmissiveTriangle { vertices, material: used.record, mean_luminance, slot: NONE });
             }
         }
-        let triangle = attributes.triangles.len() as u32;
-        mesh.leaves.push(LeafSlot { vertices, triangle, light, kind });
-        attributes.triangles.push(attributes.vertices.triangle(stored, corners));
+        attributes.flags |= record.kind & TRIANGLE_ATTRIBUTES;
+        kept.push(corners);
+        records.push(record);
     }
+    mesh.triangles += kept.len() as u32;
+    mesh.leaves.extend(pairs(&kept, &positions).into_iter().map(|pair| {
+        let vertices = |(index, corner): (u32, usize)| {
+            turned(kept[index as usize], corner).map(|vertex| positions[vertex as usize])
+        };
+        let record = |(index, corner): (u32, usize)| {
+            let record = records[index as usize];
+            Triangle { vertices: turned(record.vertices, corner), ..record }
+        };
+        Leaf {
+            slot: leaf_slot(vertices(pair.first), pair.second.map(vertices)),
+            first: record(pair.first),
+            second: pair.second.map(record),
+        }
+    }));
     Ok(())
 }
 

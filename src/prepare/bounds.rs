@@ -34,6 +34,12 @@ impl Bounds {
         !self.min.cmple(self.max).all()
     }
 
+    /// Half the surface area; at most +∞, whatever the extent.
+    pub fn half_area(&self) -> f32 {
+        let size = self.max - self.min;
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
     /// Whether it contains all of `other`.
     pub fn contains(&self, other: &Self) -> bool {
         other.is_empty() || (self.min.cmple(other.min).all() && self.max.cmpge(other.max).all())

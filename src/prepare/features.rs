@@ -57,6 +57,11 @@ pub struct Features {
 
 impl Features {
     /// Every feature's name, and whether it is in.
+    /// Whether the kernel reads attributes of vertices (`HAS_ATTRIBUTES` in shaders/include/features.glsl).
+    pub fn has_attributes(&self) -> bool {
+        self.normals || self.textures || self.normal_maps || self.anisotropy || self.vertex_colors
+    }
+
     fn list(&self) -> Vec<(&'static str, bool)> {
         let bsdf = |kind: u32| self.bsdfs & (1 << kind) != 0;
         let light = |kind: u32| self.lights & (1 << kind) != 0;

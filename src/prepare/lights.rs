@@ -104,7 +104,7 @@ const NO_LIGHT: Light = Light {
     cone_scale: 0.0,
     cone_offset: 0.0,
     trail: 0,
-    unused: 0,
+    material: 0,
 };
 
 /// Collects the lights: baked triangles (so that a baked leaf's light is its index), each instance's triangles, punctual
@@ -219,7 +219,7 @@ impl LightTable {
             intensity,
             cone: LightCone::lambertian(normal, two_sided),
         };
-        let record = Light { kind: LIGHT_TRIANGLE, slot: triangle.slot, instance, ..NO_LIGHT };
+        let record = Light { kind: LIGHT_TRIANGLE, slot: triangle.slot, material: triangle.material, instance, ..NO_LIGHT };
         self.push_placed(record, power, placed);
     }
 }

@@ -8,7 +8,7 @@ use super::textures::{ColorSpace, Lookup, TextureTable};
 use crate::layout::{
     BSDF_GLASS, BSDF_LAMBERTIAN, BSDF_METALLIC_ROUGHNESS, BSDF_MIRROR, BSDF_REFRACT, BSDF_UNLIT, MATERIAL_ALPHA_BLEND,
     MATERIAL_ALPHA_MASK, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_KIND_MASK, MATERIAL_SCHLICK,
-    MATERIAL_VOLUME, Material, NONE, SLOT_MATERIAL_MASK, TEXTURE_MIPS, TEXTURE_SET_1,
+    MATERIAL_VOLUME, Material, NONE, TRIANGLE_INDEX_MASK, TEXTURE_MIPS, TEXTURE_SET_1,
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding, Volume};
 
@@ -133,7 +133,7 @@ impl MaterialTable {
             return Ok(MaterialUse::ABSENT);
         }
         let record_index = self.records.len() as u32;
-        if record_index > SLOT_MATERIAL_MASK {
+        if record_index > TRIANGLE_INDEX_MASK {
             return Err(PrepareError::TooManyMaterials);
         }
         let mut bind = |binding: Option<TextureBinding>, needed: bool, space: ColorSpace, lookup: Lookup| match binding

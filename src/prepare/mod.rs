@@ -22,6 +22,7 @@ mod materials;
 mod mip;
 mod near_lamps;
 mod pack;
+mod pairs;
 mod textures;
 mod vertices;
 
@@ -39,7 +40,10 @@ pub use textures::srgb_to_linear;
 use self::materials::MaterialTable;
 use self::pack::{pack, pack_words};
 use self::textures::TextureTable;
-use crate::layout::{InstanceRecord, RenderConstants, SCENE_ARRAYS, SceneArray, Texel};
+use crate::layout::{
+    InstanceRecord, LeafSlot, NONE, RenderConstants, SCENE_ARRAYS, SceneArray, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Texel,
+    Triangle,
+};
 use crate::named_enum::named_enum;
 use crate::scene::Scene;
 
@@ -119,10 +123,10 @@ pub enum PrepareError {
     #[error("too many vertices with normals or texture coordinates: at most 2³¹ can be addressed")]
     TooManyVertices,
     /// Materials have no numbers left.
-    #[error("too many materials: a triangle can refer to 2²⁴")]
+    #[error("too many materials: a triangle can refer to 2²⁶")]
     TooManyMaterials,
     /// Lights have no numbers left.
-    #[error("too many emissive triangles: at most 2²⁹ lights can be addressed")]
+    #[error("too many emissive triangles: at most 2²⁶ in a mesh, and 2²⁹ lights in all, can be addressed")]
     TooManyLights,
     /// The texel array has no numbers left.
     #[error("the textures are larger than 16 GiB together; scale them down")]
@@ -249,12 +253,38 @@ fn luminance([r, g, b]: [f32; 3]) -> f64 {
 }
 
 impl Prepared {
-    /// Slots of a mesh's triangles, in slot order.
+    /// Numbers of a mesh's triangles (see [`LeafSlot`]), ascending.
     pub fn triangle_slots<'a>(&'a self, mesh: &PreparedMesh) -> impl Iterator<Item = u32> + use<'a> {
-        let slots = &self.arrays[SceneArray::Slots as usize];
-        mesh.slots.clone().filter(move |&slot| {
-            let texels = &slots[3 * slot as usize..][..3];
-            bvh::is_triangle(&[texels[0], texels[1], texels[2]])
-        })
+        mesh.slots.clone().flat_map(|slot| (0..bvh::triangles_in(&self.slot(slot))).map(move |k| 2 * slot + k))
     }
+
+    fn slot(&self, slot: u32) -> bvh::Slot {
+        let texels = &self.arrays[SceneArray::Slots as usize][3 * slot as usize..][..3];
+        [texels[0], texels[1], texels[2]]
+    }
+
+    /// A triangle by its number, as the shader reads it.
+    pub fn triangle(&self, number: u32) -> PreparedTriangle {
+        let [a, b, c, d] = bytemuck::cast::<bvh::Slot, LeafSlot>(self.slot(number / 2)).vertices;
+        let attributes = &self.arrays[SceneArray::Attributes as usize];
+        let record = if self.constants.vertex_texels > 0 {
+            bytemuck::cast(attributes[number as usize])
+        } else {
+            Triangle { vertices: [NONE; 3], kind: attributes.as_flattened()[number as usize] }
+        };
+        let index = record.kind & TRIANGLE_INDEX_MASK;
+        let light = if record.kind & TRIANGLE_LIGHT != 0 { Some(index) } else { None };
+        PreparedTriangle { vertices: if number % 2 == 0 { [a, b, c] } else { [a, c, d] }, record, light }
+    }
+}
+
+/// A triangle with what stands in its record.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedTriangle {
+    /// Its vertices in the space of its mesh.
+    pub vertices: [[f32; 3]; 3],
+    /// Its record; without vertices where none are stored.
+    pub record: Triangle,
+    /// Its light, in an instanced mesh relative to the instance's first; then the material is in the light's record.
+    pub light: Option<u32>,
 }

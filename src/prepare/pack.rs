@@ -48,8 +48,14 @@ pub(super) fn pack_arrays(
 ) -> ([Vec<Texel>; SCENE_ARRAYS], RenderConstants) {
     let bounds = acceleration.bounds.to_f64();
     let mut attributes = Vec::new();
-    append(&mut attributes, &geometry.attributes.triangles);
-    let vertices = append(&mut attributes, &geometry.attributes.vertices.texels);
+    let has_attributes = features.has_attributes();
+    let mut vertices = 0;
+    if has_attributes {
+        append(&mut attributes, &acceleration.triangles);
+        vertices = append(&mut attributes, &geometry.attributes.vertices.texels);
+    } else {
+        attributes = pack(acceleration.triangles.chunks(4), |four, k| four.get(k).map_or(0, |t| t.kind));
+    }
     let mut tables = Vec::new();
     let (sin, cos) = environment.rotation_radians.sin_cos();
     let light_cdf = lights.cdf();
@@ -57,7 +63,7 @@ pub(super) fn pack_arrays(
         if lights.near_lights() > 0 { super::cdf::count(&light_cdf, light_cdf.len() - 2) } else { 0 };
     let constants = RenderConstants {
         vertices,
-        vertex_texels: geometry.attributes.vertices.stride(),
+        vertex_texels: if has_attributes { geometry.attributes.vertices.stride() } else { 0 },
         root_slot: acceleration.meshes.first().map_or(0, |world| world.root_slot),
         materials: append(&mut tables, &materials.records),
         textures: append(&mut tables, &textures.headers),
@@ -114,7 +120,7 @@ pub(super) fn features(
     environment: &PreparedEnvironment,
     lights: &LightTable,
 ) -> Features {
-    let any = |flag: u32| geometry.attributes.triangles.iter().any(|triangle| triangle.flags & flag != 0);
+    let any = |flag: u32| geometry.attributes.flags & flag != 0;
     let mut features = Features {
         lights: lights.kinds(),
         instances: !acceleration.instances.is_empty(),

@@ -96,6 +96,7 @@ impl Vertices {
     }
 
     /// The record of a triangle with these corners of a primitive.
+    /// Its kind has nothing but the `TRIANGLE_*` bits of what the vertices carry.
     pub(super) fn triangle(&self, stored: Stored, corners: [u32; 3]) -> Triangle {
         let mut flags = stored.flags;
         if flags == 0 {
@@ -107,7 +108,7 @@ impl Vertices {
         if vertices.iter().any(|&vertex| normal(vertex) == [0; 3]) {
             flags &= !TRIANGLE_NORMALS;
         }
-        Triangle { vertices, flags }
+        Triangle { vertices, kind: flags }
     }
 }
 

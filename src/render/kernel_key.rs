@@ -8,7 +8,7 @@ use crate::prepare::{EnvironmentKind, Features, LightChoice, Prepared};
 use crate::scene::{Camera, Projection};
 
 /// Version of the BVH's node layout; part of the key.
-const NODE_LAYOUT: &str = "bvh4-q8";
+const NODE_LAYOUT: &str = "bvh4-q8-pairs";
 
 /// What a path-tracing kernel is built with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -9,7 +9,7 @@ use crate::gpu::{
     AccelerationStructures, ArrayForm, BindingResource, Buffer, DeviceInfo, DeviceKind, Gpu, GpuError, GpuResult,
     InstanceGeometry, MeshGeometry, MeshPart, TraceBackend,
 };
-use crate::layout::{MAX_CHUNKS, SCENE_ARRAYS, SLOT_ALPHA, SceneArray, Texel};
+use crate::layout::{MAX_CHUNKS, SCENE_ARRAYS, SceneArray, TRIANGLE_ALPHA, Texel};
 use crate::prepare::Prepared;
 
 /// Custom index of the baked mesh, as in shaders/include/trace_ray_query.glsl.
@@ -126,7 +126,7 @@ fn upload_addresses(gpu: &Arc<Gpu>, chunks: &[Vec<Buffer>]) -> GpuResult<Buffer>
     Buffer::with_data(gpu, "array addresses", &words, Usage::UNIFORM_BUFFER)
 }
 
-/// Every mesh over all of its slots, so that primitive i is slot first + i; slots that are no triangles become degenerate
+/// Every mesh over all of its slots, so that primitive i is triangle 2·first + i; those that are not there become degenerate
 /// ones. Where some triangles have alpha there is a second list, in which they stand and the opaque ones are degenerate:
 /// so only they ask the shader.
 fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<AccelerationStructures> {
@@ -136,18 +136,20 @@ fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<Accelera
         let texels: &[Texel] = &slots[3 * mesh.slots.start as usize..3 * mesh.slots.end as usize];
         let words: &[u32] = bytemuck::cast_slice(texels);
         let vertices: Vec<[f32; 3]> = words.chunks_exact(3).map(|v| [v[0], v[1], v[2]].map(f32::from_bits)).collect();
-        let part = |opaque| MeshPart { indices: vec![[0_u32; 3]; texels.len() / 3], opaque };
+        let slot_count = texels.len() / 3;
+        let part = |opaque| MeshPart { indices: vec![[0_u32; 3]; 2 * slot_count], opaque };
         let (mut opaque, mut alpha) = (part(true), None);
-        let mut is_triangle = vec![false; texels.len() / 3];
-        for slot in prepared.triangle_slots(mesh) {
-            let i = slot - mesh.slots.start;
-            let has_alpha = texels[3 * i as usize + 2][3] & SLOT_ALPHA != 0;
+        let mut is_leaf = vec![false; slot_count];
+        for number in prepared.triangle_slots(mesh) {
+            let i = number - 2 * mesh.slots.start;
+            let has_alpha = prepared.triangle(number).record.kind & TRIANGLE_ALPHA != 0;
             let list = if has_alpha { alpha.get_or_insert_with(|| part(false)) } else { &mut opaque };
-            list.indices[i as usize] = [4 * i, 4 * i + 1, 4 * i + 2];
-            is_triangle[i as usize] = true;
+            let first = 4 * (i / 2);
+            list.indices[i as usize] = [first, first + 1 + i % 2, first + 2 + i % 2];
+            is_leaf[(i / 2) as usize] = true;
         }
         let parts: Vec<MeshPart> = [Some(opaque), alpha].into_iter().flatten().collect();
-        geometry.push((keep_finite(vertices, &is_triangle), parts));
+        geometry.push((keep_finite(vertices, &is_leaf), parts));
     }
     let meshes: Vec<_> = geometry.iter().map(|(vertices, parts)| MeshGeometry { vertices, parts }).collect();
     let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
@@ -160,13 +162,10 @@ fn build_acceleration(gpu: &Arc<Gpu>, prepared: &Prepared) -> GpuResult<Accelera
     AccelerationStructures::build(gpu, &meshes, &instances)
 }
 
-/// Words of inner slots read as floats can be NaN; only triangles' vertices matter.
-fn keep_finite(mut vertices: Vec<[f32; 3]>, is_triangle: &[bool]) -> Vec<[f32; 3]> {
-    for (quad, &is_triangle) in vertices.chunks_exact_mut(4).zip(is_triangle) {
-        if !is_triangle {
-            quad.fill([0.0; 3]);
-        }
-        quad[3] = [0.0; 3];
+/// Words of inner slots read as floats can be NaN; only leaves' vertices matter.
+fn keep_finite(mut vertices: Vec<[f32; 3]>, is_leaf: &[bool]) -> Vec<[f32; 3]> {
+    for (quad, _) in vertices.chunks_exact_mut(4).zip(is_leaf).filter(|(_, is_leaf)| !**is_leaf) {
+        quad.fill([0.0; 3]);
     }
     vertices
 }

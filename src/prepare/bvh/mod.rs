@@ -9,7 +9,7 @@ mod wide;
 pub use binary::{MAX_DEPTH, Primitive};
 pub use quantise::{decode, inner_slot, is_present};
 pub use validate::{TreeContents, validate};
-pub use wide::{Appended, GROUP_BITS, Slot, empty_slot, is_triangle};
+pub use wide::{Appended, GROUP_BITS, Slot, empty_slot, triangles_in};
 
 use super::PrepareError;
 use super::bounds::Bounds;

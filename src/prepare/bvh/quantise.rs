@@ -1,16 +1,16 @@
 //! Child boxes on an 8-bit grid (after Ylitie et al., "Efficient incoherent ray traversal on GPUs through compressed
 //! wide BVHs", HPG 2017): in exact arithmetic, the decoded box contains the box it stands for.
 
-use crate::layout::InnerSlot;
+use crate::layout::{InnerSlot, SLOT_INNER};
 use crate::prepare::bounds::Bounds;
 
 const EXPONENT_BIAS: i32 = 127;
 const GRID_STEPS: u32 = 255;
 
-/// An inner slot with up to four children. `kind` is zero, the absent children have lower 255 and upper 0.
+/// An inner slot with up to four children. The absent children have lower 255 and upper 0.
 pub fn inner_slot(children: &[Bounds], child_group: u32) -> InnerSlot {
     let bounds = children.iter().fold(Bounds::EMPTY, |union, &child| union.union(child));
-    let mut slot = InnerSlot { lower: [u32::MAX; 3], upper: [0; 3], child_group, ..InnerSlot::default() };
+    let mut slot = InnerSlot { lower: [u32::MAX; 3], upper: [0; 3], child_group, kind: SLOT_INNER, ..InnerSlot::default() };
     for axis in 0..3 {
         let (origin, end) = if children.is_empty() { (0.0, 0.0) } else { (bounds.min[axis], bounds.max[axis]) };
         let exponent = step_exponent(origin, end);

@@ -3,14 +3,14 @@
 use super::binary::MAX_DEPTH;
 use super::quantise::{compare_sum, decode, is_present};
 use super::wide::{Slot, empty_slot};
-use crate::layout::{InnerSlot, InstanceSlot, LeafSlot, SLOT_GROUP, SLOT_INSTANCE, SLOT_LEAF};
+use crate::layout::{InnerSlot, InstanceSlot, LeafSlot, SLOT_GROUP, SLOT_INNER, SLOT_INSTANCE, SLOT_NO_LEAF};
 use crate::prepare::bounds::Bounds;
 
 /// What a valid tree holds.
 #[derive(Clone, Debug, Default)]
 pub struct TreeContents {
-    /// Slots of its triangles.
-    pub triangle_slots: Vec<u32>,
+    /// Slots of its leaves.
+    pub leaf_slots: Vec<u32>,
     /// Slots of its instances.
     pub instance_slots: Vec<u32>,
     /// Inner slots.
@@ -37,7 +37,7 @@ pub fn validate(slots: &[Slot], root: u32, instance_bounds: &[Bounds]) -> Result
         area_sum: 0.0,
     };
     let root_slot: InnerSlot = bytemuck::cast(*slots.get(root as usize).ok_or("the root is out of range")?);
-    if root_slot.kind != 0 {
+    if root_slot.kind != SLOT_INNER {
         return Err(format!("the root {root} is no inner slot"));
     }
     let bounds = walk.inner(root, &root_slot, 1)?;
@@ -92,11 +92,11 @@ impl Walk<'_> {
 
     fn child(&mut self, place: u32, slot: Slot, depth: u32) -> Result<Bounds, String> {
         let kind = slot[2][3];
-        if kind & SLOT_LEAF != 0 {
+        if kind < SLOT_NO_LEAF {
             let leaf: LeafSlot = bytemuck::cast(slot);
-            self.contents.triangle_slots.push(place);
+            self.contents.leaf_slots.push(place);
             Ok(Bounds::around(leaf.vertices))
-        } else if kind & SLOT_INSTANCE != 0 {
+        } else if kind == SLOT_INSTANCE {
             let instance: InstanceSlot = bytemuck::cast(slot);
             self.contents.instance_slots.push(place);
             self.instance_bounds

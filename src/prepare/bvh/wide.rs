@@ -5,7 +5,7 @@ use bytemuck::Zeroable;
 use super::binary::Node;
 use super::collapse::{choose, wide_children};
 use super::quantise::inner_slot;
-use crate::layout::{LeafSlot, SLOT_GROUP, SLOT_LEAF, Texel};
+use crate::layout::{LeafSlot, SLOT_GROUP, SLOT_NO_LEAF, Texel};
 use crate::prepare::PrepareError;
 use crate::prepare::bounds::Bounds;
 
@@ -30,12 +30,16 @@ pub struct Appended {
 
 /// The slot of an absent child.
 pub fn empty_slot() -> Slot {
-    bytemuck::cast(LeafSlot { kind: SLOT_LEAF, ..LeafSlot::zeroed() })
+    bytemuck::cast(LeafSlot::zeroed())
 }
 
-/// Whether a slot is a triangle that is there.
-pub fn is_triangle(slot: &Slot) -> bool {
-    slot[2][3] & SLOT_LEAF != 0 && *slot != empty_slot()
+/// The number of triangles in a slot: 0 of one that is empty or no leaf.
+pub fn triangles_in(slot: &Slot) -> u32 {
+    if slot[2][3] >= SLOT_NO_LEAF || *slot == empty_slot() {
+        return 0;
+    }
+    let vertices = bytemuck::cast::<Slot, LeafSlot>(*slot).vertices.map(|vertex| vertex.map(f32::to_bits));
+    if vertices[3] == vertices[0] { 1 } else { 2 }
 }
 
 /// Appends a tree to `slots`: a group that holds only the root, which is always an inner slot, then the others.
