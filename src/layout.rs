@@ -35,11 +35,11 @@ pub const SCENE_ARRAYS: usize = 5;
 pub const MAX_CHUNKS: usize = 4;
 
 /// `kind` of an inner slot. Read as a float it is NaN, which the last word of a [`LeafSlot`] never is.
-pub const SLOT_INNER: u32 = 0xffff_ffff;
+pub const SLOT_INNER: u32 = 0xffffffff;
 /// `kind` of an instance.
-pub const SLOT_INSTANCE: u32 = 0xffff_fffe;
+pub const SLOT_INSTANCE: u32 = 0xfffffffe;
 /// The least last word of a slot that is no leaf: the bits of −∞, above those of every finite float.
-pub const SLOT_NO_LEAF: u32 = 0xff80_0000;
+pub const SLOT_NO_LEAF: u32 = 0xff800000;
 /// Slots stand in groups of this many: the children of one inner slot.
 pub const SLOT_GROUP: u32 = 4;
 
@@ -104,7 +104,7 @@ pub const TRIANGLE_TEXCOORDS: u32 = 1 << 27;
 /// Bit of `kind`: the vertices carry normals.
 pub const TRIANGLE_NORMALS: u32 = 1 << 26;
 /// Bits of `kind` that say what the vertices carry.
-pub const TRIANGLE_ATTRIBUTES: u32 = 0x3c00_0000;
+pub const TRIANGLE_ATTRIBUTES: u32 = 0x3c000000;
 /// Bits of `kind` that hold the index of the material or light.
 pub const TRIANGLE_INDEX_MASK: u32 = (1 << 26) - 1;
 
@@ -297,30 +297,30 @@ pub const LIGHT_DIRECTIONAL: u32 = 3;
 pub const LIGHT_ENVIRONMENT: u32 = 4;
 
 /// A light that can be sampled. Lights are picked by the CDF at `light_cdf_word`; with a light BVH its bins are the lights
-/// without a place, which come last, then the tree.
+/// without a place, which come last, then the tree. The first texel is all that a triangle needs.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Light {
-    /// Position (point, spot).
-    pub position: [f32; 3],
     /// One of `LIGHT_*`.
     pub kind: u32,
-    /// Radiant intensity or, for a directional light, irradiance.
-    pub intensity: [f32; 3],
     /// Number of the triangle ([`LIGHT_TRIANGLE`]), see [`LeafSlot`].
     pub slot: u32,
-    /// Direction the light travels (spot, directional), unit.
-    pub direction: [f32; 3],
     /// Instance of the triangle or [`NONE`].
     pub instance: u32,
-    /// Spot: falloff = clamp(cos θ · scale + offset, 0, 1)².
-    pub cone_scale: f32,
-    /// See `cone_scale`.
-    pub cone_offset: f32,
-    /// The way to its leaf in the light BVH: two bits a node, the root's lowest.
-    pub trail: u32,
     /// Material of the triangle.
     pub material: u32,
+    /// Position (point, spot).
+    pub position: [f32; 3],
+    /// Spot: falloff = clamp(cos θ · scale + offset, 0, 1)².
+    pub cone_scale: f32,
+    /// Radiant intensity or, for a directional light, irradiance.
+    pub intensity: [f32; 3],
+    /// See `cone_scale`.
+    pub cone_offset: f32,
+    /// Direction the light travels (spot, directional), unit.
+    pub direction: [f32; 3],
+    /// The way to its leaf in the light BVH: two bits a node, the root's lowest.
+    pub trail: u32,
 }
 
 /// Texels a light takes.

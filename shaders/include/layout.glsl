@@ -170,15 +170,15 @@ struct TextureHeader {
 };
 
 struct Light {
-    vec3 position;
     uint kind;
-    vec3 intensity;
     uint slot;
-    vec3 direction;
     uint instance;
-    float cone_scale;
-    float cone_offset;
     uint material;
+    vec3 position;
+    float cone_scale;
+    vec3 intensity;
+    float cone_offset;
+    vec3 direction;
 };
 
 #endif

@@ -115,7 +115,7 @@ CdfSample light_bvh_sample(RenderConstants constants, LightReceiver receiver, ui
 
 // Probability of a light of the tree, by the way to its leaf: two bits a node.
 float light_bvh_probability(RenderConstants constants, LightReceiver receiver, uint light) {
-    uint trail = LOAD4(TABLES, constants.lights + light * LIGHT_TEXELS + 3u).z;
+    uint trail = LOAD4(TABLES, constants.lights + light * LIGHT_TEXELS + 3u).w;
     uint counts = constants.light_bvh_counts;
     uint child = 0u;
     do {

@@ -63,15 +63,15 @@ Light load_light(RenderConstants constants, uint index) {
     uvec4 c = LOAD4(TABLES, base + 2u);
     uvec4 d = LOAD4(TABLES, base + 3u);
     Light light;
-    light.position = uintBitsToFloat(a.xyz);
-    light.kind = a.w;
-    light.intensity = uintBitsToFloat(b.xyz);
-    light.slot = b.w;
-    light.direction = uintBitsToFloat(c.xyz);
-    light.instance = c.w;
-    light.cone_scale = uintBitsToFloat(d.x);
-    light.cone_offset = uintBitsToFloat(d.y);
-    light.material = d.w;
+    light.kind = a.x;
+    light.slot = a.y;
+    light.instance = a.z;
+    light.material = a.w;
+    light.position = uintBitsToFloat(b.xyz);
+    light.cone_scale = uintBitsToFloat(b.w);
+    light.intensity = uintBitsToFloat(c.xyz);
+    light.cone_offset = uintBitsToFloat(c.w);
+    light.direction = uintBitsToFloat(d.xyz);
     return light;
 }
 
@@ -118,7 +118,7 @@ TriangleLook triangle_look(RenderConstants constants, uint kind, uint instance) 
     uint index = kind & TRIANGLE_INDEX_MASK;
     if (!HAS_LIGHT(LIGHT_TRIANGLE) || (kind & TRIANGLE_LIGHT) == 0u) return TriangleLook(NONE, index);
     if (HAS_INSTANCES && instance != NONE) index += load_instance_header(constants, instance).y;
-    return TriangleLook(index, LOAD4(TABLES, constants.lights + index * LIGHT_TEXELS + 3u).w);
+    return TriangleLook(index, LOAD4(TABLES, constants.lights + index * LIGHT_TEXELS).w);
 }
 
 #endif

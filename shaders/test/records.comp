@@ -22,10 +22,10 @@ void main() {
     outputs[o + 6u] = uvec4(bits(m.anisotropy), bits(m.anisotropy_turns), bits(m.normal_scale), m.unused);
     outputs[o + 7u] = uvec4(m.transmission_texture, m.specular_texture, m.specular_color_texture, m.anisotropy_texture);
     Light light = load_light(constants, lane);
-    outputs[o + 8u] = uvec4(bits(light.position), light.kind);
-    outputs[o + 9u] = uvec4(bits(light.intensity), light.slot);
-    outputs[o + 10u] = uvec4(bits(light.direction), light.instance);
-    outputs[o + 11u] = uvec4(bits(light.cone_scale), bits(light.cone_offset), 0u, light.material);
+    outputs[o + 8u] = uvec4(light.kind, light.slot, light.instance, light.material);
+    outputs[o + 9u] = uvec4(bits(light.position), bits(light.cone_scale));
+    outputs[o + 10u] = uvec4(bits(light.intensity), bits(light.cone_offset));
+    outputs[o + 11u] = uvec4(bits(light.direction), 0u);
     TextureHeader header = load_texture_header(constants, lane);
     outputs[o + 12u] = uvec4(header.first_word, header.width, header.height, header.sampling);
     outputs[o + 13u] = uvec4(bits(header.u_row), header.mips);

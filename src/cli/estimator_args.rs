@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use sunfleck::render::{
-    DeviceChoice, EnvironmentSampling, Integrator, LightChoice, LightSampling, MisHeuristic, SamplerKind, Settings,
-    TraceChoice,
+    BvhQuality, DeviceChoice, EnvironmentSampling, Integrator, LightChoice, LightSampling, MisHeuristic, SamplerKind,
+    Settings, TraceChoice,
 };
 use sunfleck::{Error, Result};
 
@@ -61,6 +61,10 @@ pub(crate) struct EstimatorArgs {
     /// How rays are traced: by hardware ray queries, by the shader's own BVH, or whichever the device has.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<TraceChoice>(TraceChoice::NAMES), help_heading = "Device")]
     trace: TraceChoice,
+    /// How long the BVH may take to build, for how fast rays go through it: fast for a look at a large scene, high for long
+    /// renders. Hardware ray queries have trees of their own.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<BvhQuality>(BvhQuality::NAMES), help_heading = "Device")]
+    bvh_quality: BvhQuality,
     /// Folder of shader sources to use in place of the built-in ones.
     #[arg(long, value_name = "DIR", help_heading = "Device")]
     shaders: Option<PathBuf>,
@@ -95,6 +99,7 @@ impl EstimatorArgs {
             ("mis", self.mis.name(), default.mis_heuristic.name()),
             ("env-sampling", self.env_sampling.name(), default.env_sampling.name()),
             ("trace", self.trace.name(), default.trace.name()),
+            ("bvh-quality", self.bvh_quality.name(), default.bvh_quality.name()),
         ];
         for (name, value, default) in named {
             if value != default {
@@ -139,6 +144,7 @@ impl EstimatorArgs {
         settings.env_sampling = self.env_sampling;
         settings.mip = !self.no_mip;
         settings.trace = self.trace;
+        settings.bvh_quality = self.bvh_quality;
         settings.device = self.device;
         settings.shaders_dir = self.shaders;
         Ok(EnvironmentArgs { file: self.env, strength: self.env_strength, rotation_degrees: self.env_rotation })

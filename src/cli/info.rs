@@ -7,15 +7,18 @@ use serde_json::{Value, json};
 use sunfleck::scene::{AlphaMode, Bsdf, Environment, Lobe, Material, Projection, PunctualKind, Scene, load};
 
 use sunfleck::prepare::Prepared;
-use sunfleck::render::{Settings, prepare_scene};
+use sunfleck::render::{BvhQuality, Settings, prepare_scene};
 
-use super::{devices, print_json, print_warnings};
+use super::{devices, parse, print_json, print_warnings};
 
 /// Say what is in a scene, what was added to it and what is skipped.
 #[derive(Args, Debug)]
 pub(crate) struct InfoArgs {
     /// A .gltf, .glb or .obj file, or the name of a built-in scene.
     scene: String,
+    /// How long the BVH may take to build, for how fast rays go through it.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<BvhQuality>(BvhQuality::NAMES))]
+    bvh_quality: BvhQuality,
     /// Print one JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -29,7 +32,8 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
     let mut scene = load::resolve(&args.scene).map_err(sunfleck::Error::from)?;
     scene.frame_if_no_camera();
     scene.light_if_dark();
-    let prepared = prepare_scene(&scene, &scene.cameras[0], &Settings::default())?;
+    let settings = Settings { bvh_quality: args.bvh_quality, ..Settings::default() };
+    let prepared = prepare_scene(&scene, &scene.cameras[0], &settings)?;
     print_for_people(&scene);
     print_prepared(&prepared);
     if let Some(environment) = sunfleck::gpu::driver_environment() {
@@ -212,12 +216,25 @@ fn describe_prepared(prepared: &Prepared) -> Value {
         "lights": s.lights,
         "light_choice": prepared.features.light_choice.name(),
         "light_bvh_nodes": s.light_nodes,
-        "bvh": {"inner_nodes": s.inner_slots, "depth": s.depth, "sah_cost": s.sah_cost, "build_seconds": s.bvh_seconds},
+        "bvh": {
+            "inner_nodes": s.inner_slots,
+            "depth": s.depth,
+            "sah_cost": s.sah_cost,
+            "bytes": s.array_bytes[0],
+            "build_seconds": s.bvh_seconds,
+        },
+        "gpu_bytes_per_triangle": bytes_per_triangle(prepared),
         "gpu_bytes": s.array_bytes.iter().sum::<u64>(),
         "gpu_bytes_by_array": arrays,
         "kept": prepared.features.kept(),
         "dropped": prepared.features.dropped(),
     })
+}
+
+/// Slots and attributes over the triangles stored; null without any.
+fn bytes_per_triangle(prepared: &Prepared) -> Option<f64> {
+    let s = &prepared.statistics;
+    (s.triangles > 0).then(|| (s.array_bytes[0] + s.array_bytes[1]) as f64 / s.triangles as f64)
 }
 
 fn print_prepared(prepared: &Prepared) {
@@ -231,6 +248,9 @@ fn print_prepared(prepared: &Prepared) {
         "  BVH          {} triangles, {} shared instances; {} inner nodes, depth {}, SAH cost {:.1}, {:.3} s",
         s.triangles, s.instances, s.inner_slots, s.depth, s.sah_cost, s.bvh_seconds
     );
+    if let Some(bytes) = bytes_per_triangle(prepared) {
+        eprintln!("               {} bytes; with attributes {bytes:.1} a triangle", s.array_bytes[0]);
+    }
     eprintln!(
         "  lights       {} sampled, picked by {}{}",
         s.lights,

@@ -4,13 +4,11 @@ use glam::DVec3;
 
 use super::attributes::MeshGeometry;
 use super::bounds::{Bounds, DBounds};
-use super::bvh::{self, Primitive, Slot, Tree};
+use super::bvh::{self, BvhQuality, Primitive, Slot, Tree};
 use super::geometry::{Geometry, SharedMesh};
 use super::instances::Matrices;
 use super::{COORDINATE_LIMIT, PrepareError, PreparedMesh};
-use crate::layout::{
-    InstanceRecord, InstanceSlot, SLOT_INSTANCE, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Triangle,
-};
+use crate::layout::{InstanceRecord, InstanceSlot, SLOT_INSTANCE, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Triangle};
 
 /// A shared mesh's tree covers itself with this many boxes: rotated, they bound an instance tighter than one would.
 const COVER_BOXES: usize = 64;
@@ -51,15 +49,16 @@ impl Acceleration {
 }
 
 /// Builds all trees and notes the slots of emissive triangles in `geometry`. `camera` is in rebased space.
-pub(super) fn build(geometry: &mut Geometry, camera: DVec3) -> Result<Acceleration, PrepareError> {
-    let trees: Vec<Tree> = geometry.shared.iter().map(|mesh| Tree::build(&mut primitives(&mesh.geometry))).collect();
+pub(super) fn build(geometry: &mut Geometry, camera: DVec3, quality: BvhQuality) -> Result<Acceleration, PrepareError> {
+    let trees: Vec<Tree> =
+        geometry.shared.iter().map(|mesh| Tree::build(&mut primitives(&mesh.geometry), quality)).collect();
     let mut acceleration = Acceleration::new();
     place_instances(&mut acceleration, geometry, &trees, camera)?;
 
     let mut primitives = primitives(&geometry.world);
     let first_instance = primitives.len() as u32;
     primitives.extend((first_instance..).zip(&acceleration.instance_bounds).map(|(i, b)| Primitive::new(i, b)));
-    let tree = Tree::build(&mut primitives);
+    let tree = Tree::build(&mut primitives, quality);
     acceleration.bounds = tree.bounds();
     append(&mut acceleration, &tree, &mut geometry.world)?;
     for (tree, mesh) in trees.iter().zip(&mut geometry.shared) {

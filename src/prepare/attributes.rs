@@ -4,10 +4,13 @@ use glam::{DAffine3, DVec3, Vec3, Vec3Swizzles};
 
 use super::coincident::SeenTriangles;
 use super::materials::MaterialTable;
+use super::pairs::{leaf_slot, pairs, turned};
 use super::vertices::Vertices;
 use super::{COORDINATE_LIMIT, PrepareError};
-use super::pairs::{leaf_slot, pairs, turned};
-use crate::layout::{LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, TRIANGLE_ALPHA, TRIANGLE_ATTRIBUTES, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Triangle};
+use crate::layout::{
+    LeafSlot, MATERIAL_DOUBLE_SIDED, NONE, TRIANGLE_ALPHA, TRIANGLE_ATTRIBUTES, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT,
+    Triangle,
+};
 use crate::scene::Primitive;
 
 /// The records of all meshes.

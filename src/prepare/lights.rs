@@ -219,7 +219,8 @@ impl LightTable {
             intensity,
             cone: LightCone::lambertian(normal, two_sided),
         };
-        let record = Light { kind: LIGHT_TRIANGLE, slot: triangle.slot, material: triangle.material, instance, ..NO_LIGHT };
+        let record =
+            Light { kind: LIGHT_TRIANGLE, slot: triangle.slot, material: triangle.material, instance, ..NO_LIGHT };
         self.push_placed(record, power, placed);
     }
 }

@@ -31,6 +31,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+pub use bvh::BvhQuality;
 pub use camera::camera_constants;
 pub use environment::EnvironmentKind;
 pub use features::Features;
@@ -41,8 +42,8 @@ use self::materials::MaterialTable;
 use self::pack::{pack, pack_words};
 use self::textures::TextureTable;
 use crate::layout::{
-    InstanceRecord, LeafSlot, NONE, RenderConstants, SCENE_ARRAYS, SceneArray, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Texel,
-    Triangle,
+    InstanceRecord, LeafSlot, NONE, RenderConstants, SCENE_ARRAYS, SceneArray, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT,
+    Texel, Triangle,
 };
 use crate::named_enum::named_enum;
 use crate::scene::Scene;
@@ -64,6 +65,8 @@ pub struct PrepareOptions {
     pub mip: bool,
     /// How a light is picked.
     pub light_choice: LightChoice,
+    /// How good the trees are.
+    pub bvh_quality: BvhQuality,
     /// Bakes every instance into the world: more memory, one level of traversal.
     pub bake_instances: bool,
 }
@@ -76,6 +79,7 @@ impl Default for PrepareOptions {
             sample_environment: true,
             mip: true,
             light_choice: LightChoice::default(),
+            bvh_quality: BvhQuality::default(),
             bake_instances: false,
         }
     }
@@ -228,7 +232,7 @@ pub fn prepare(scene: &Scene, options: &PrepareOptions) -> Result<Prepared, Prep
     let bvh_start = Instant::now();
     let mut geometry = geometry::gather(scene, options, &materials)?;
     let camera = options.camera - geometry.origin;
-    let mut acceleration = acceleration::build(&mut geometry, camera)?;
+    let mut acceleration = acceleration::build(&mut geometry, camera, options.bvh_quality)?;
     let bvh_seconds = bvh_start.elapsed().as_secs_f64();
     let sampling = if options.sample_environment { options.environment_sampling } else { EnvironmentSampling::Uniform };
     let environment = environment::prepare(&scene.environment, sampling)?;

@@ -32,7 +32,7 @@ pub use settings::{
 use crate::film::metadata::{world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective};
 use crate::film::replicates::ReplicateSums;
 use crate::prepare::{self, PrepareOptions, Prepared};
-pub use crate::prepare::{EnvironmentSampling, LightChoice};
+pub use crate::prepare::{BvhQuality, EnvironmentSampling, LightChoice};
 use crate::scene::{Camera, Projection, Scene};
 use crate::{Error, Result};
 
@@ -46,6 +46,7 @@ pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Res
         environment_sampling: settings.env_sampling,
         mip: settings.mip,
         light_choice: settings.light_choice,
+        bvh_quality: settings.bvh_quality,
         ..PrepareOptions::default()
     };
     Ok(prepare::prepare(scene, &options)?)

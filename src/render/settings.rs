@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::film::Film;
 use crate::named_enum::named_enum;
-use crate::prepare::{EnvironmentSampling, LightChoice};
+use crate::prepare::{BvhQuality, EnvironmentSampling, LightChoice};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -49,6 +49,8 @@ pub struct Settings {
     pub filter: PixelFilter,
     /// Look textures up in mip chains by ray cones, not in the files' texels alone.
     pub mip: bool,
+    /// How good the trees of our own BVH are.
+    pub bvh_quality: BvhQuality,
     /// Which implementation traces rays.
     pub trace: TraceChoice,
     /// Which device renders.
@@ -81,6 +83,7 @@ impl Default for Settings {
             env_sampling: EnvironmentSampling::default(),
             filter: PixelFilter::default(),
             mip: true,
+            bvh_quality: BvhQuality::default(),
             trace: TraceChoice::default(),
             device: DeviceChoice::default(),
             shaders_dir: None,

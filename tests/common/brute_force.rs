@@ -1,7 +1,7 @@
 //! What a ray meets by a loop over all triangles in f64, and whether a hit in f32 is one that exact arithmetic allows.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use sunfleck::layout::{LeafSlot, NONE, SceneArray};
+use sunfleck::layout::NONE;
 
 use super::kernel::TestKernel;
 use super::trace::{Hit, NO_TRIANGLE, Ray, TriangleId};
@@ -18,11 +18,7 @@ pub struct Triangle {
 
 pub fn world_triangles(kernel: &TestKernel) -> Vec<Triangle> {
     let prepared = &kernel.prepared;
-    let slots = &prepared.arrays[SceneArray::Slots as usize];
-    let vertices = |slot: u32| {
-        let leaf: LeafSlot = bytemuck::pod_collect_to_vec(&slots[3 * slot as usize..3 * slot as usize + 3])[0];
-        leaf.vertices.map(|v| Vec3::from(v).as_dvec3())
-    };
+    let vertices = |slot: u32| prepared.triangle(slot).vertices.map(|v| Vec3::from(v).as_dvec3());
     let baked = prepared.triangle_slots(&prepared.meshes[0]);
     let mut all: Vec<Triangle> =
         baked.map(|slot| Triangle { id: [slot, NONE], vertices: vertices(slot), condition: 0.0 }).collect();

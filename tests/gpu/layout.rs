@@ -195,7 +195,7 @@ fn constants_have_the_same_values_on_both_sides() {
     assert!(rust.len() > 30, "the constants are found: {rust:?}");
     assert_eq!(rust, shader);
     // The parser reads what the compiler does.
-    assert_eq!(rust[&"SLOT_MATERIAL_MASK".to_owned()], layout::SLOT_MATERIAL_MASK);
+    assert_eq!(rust[&"TRIANGLE_INDEX_MASK".to_owned()], layout::TRIANGLE_INDEX_MASK);
     assert_eq!(rust[&"MATERIAL_SCHLICK".to_owned()], layout::MATERIAL_SCHLICK);
     assert_eq!(rust[&"NONE".to_owned()], layout::NONE);
 }
@@ -222,9 +222,8 @@ fn records_survive_the_way_to_the_shader() {
     let leaves: Vec<layout::LeafSlot> = random_records(&mut random);
     let vertices: Vec<layout::Vertex> = random_records(&mut random);
     let texels: Vec<[u32; 4]> = random_records(&mut random);
-    let all =
-        layout::TRIANGLE_NORMALS | layout::TRIANGLE_TEXCOORDS | layout::TRIANGLE_TANGENTS | layout::TRIANGLE_COLORS;
-    let triangle = |i: u32| layout::Triangle { vertices: [RECORDS as u32 - 1 - i; 3], flags: all };
+    let triangle =
+        |i: u32| layout::Triangle { vertices: [RECORDS as u32 - 1 - i; 3], kind: layout::TRIANGLE_ATTRIBUTES | i };
     let triangles: Vec<layout::Triangle> = (0..RECORDS as u32).map(triangle).collect();
 
     let constants = &mut kernel.constants;
@@ -250,26 +249,24 @@ fn records_survive_the_way_to_the_shader() {
     let outputs = kernel.run(&[[0; 4]], RECORDS, 32);
     for (i, output) in outputs.chunks_exact(32).enumerate() {
         assert_eq!(&output[..8], bytemuck::cast_slice::<_, [u32; 4]>(&[materials[i]]), "material");
-        let light = layout::Light { trail: 0, unused: 0, ..lights[i] };
+        let light = layout::Light { trail: 0, ..lights[i] };
         assert_eq!(&output[8..12], bytemuck::cast_slice::<_, [u32; 4]>(&[light]), "light");
         let header = layout::TextureHeader { unused: 0, ..headers[i] };
         assert_eq!(&output[12..15], bytemuck::cast_slice::<_, [u32; 4]>(&[header]), "texture header");
         assert_eq!(&output[15..22], bytemuck::cast_slice::<_, [u32; 4]>(&[instances[i]]), "instance");
         assert_eq!(output[22..25], decoded_leaf(&leaves[i]), "leaf slot");
         check_vertex(&vertices[RECORDS - 1 - i], &output[25..29]);
+        assert_eq!(output[25][3], triangles[i].kind, "kind");
         assert_eq!(output[29], texels[i], "words");
         assert_eq!(output[30], texels[i], "texels");
         assert_eq!(output[31], texels[RECORDS - 1 - i], "environment");
     }
 }
 
+/// Three vertices, and the coordinates of the fourth.
 fn decoded_leaf(leaf: &layout::LeafSlot) -> [[u32; 4]; 3] {
-    let row = |vertex: [f32; 3], word: u32| {
-        let [x, y, z] = vertex.map(f32::to_bits);
-        [x, y, z, word]
-    };
-    let [a, b, c] = leaf.vertices;
-    [row(a, leaf.triangle), row(b, leaf.light), row(c, leaf.kind & layout::SLOT_MATERIAL_MASK)]
+    let [a, b, c, d] = leaf.vertices.map(|vertex| vertex.map(f32::to_bits));
+    [(a, d[0]), (b, d[1]), (c, d[2])].map(|([x, y, z], word)| [x, y, z, word])
 }
 
 fn check_vertex(vertex: &layout::Vertex, decoded: &[[u32; 4]]) {

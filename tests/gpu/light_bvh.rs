@@ -7,7 +7,7 @@ use crate::common::kernel::{Random, TestKernel, empty_scene, vector_texel};
 use crate::common::scenes::{scene, short_form};
 use crate::common::statistics::{Estimate, assert_agree, chi_square_test, sidak};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
-use sunfleck::layout::{self, LeafSlot, NONE, SceneArray};
+use sunfleck::layout::{self, NONE, SceneArray};
 use sunfleck::render::{LightChoice, LightSampling, Settings};
 use sunfleck::scene::{Bsdf, Environment, Instance, Material, Mesh, Primitive, PunctualKind, PunctualLight, Scene};
 
@@ -189,11 +189,8 @@ fn brute_light(kernel: &TestKernel, tables: &[[u32; 4]], record: layout::Light) 
     let intensity = f64::from(record.intensity[0]);
     let mut light = BruteLight { corners: [position; 3], normal: DVec3::ZERO, two_sided: false, record, intensity };
     if record.kind == layout::LIGHT_TRIANGLE {
-        let slot = 3 * record.slot as usize;
-        let slots = &kernel.prepared.arrays[SceneArray::Slots as usize][slot..slot + 3];
-        let leaf: LeafSlot = bytemuck::pod_collect_to_vec(slots)[0];
         let mut side = 1.0;
-        light.corners = leaf.vertices.map(|v| Vec3::from(v).as_dvec3());
+        light.corners = kernel.prepared.triangle(record.slot).vertices.map(|v| Vec3::from(v).as_dvec3());
         if record.instance != NONE {
             let instance = kernel.prepared.instances[record.instance as usize].record;
             let [x, y, z] = instance.object_to_world.map(|row| row.map(f64::from));
@@ -204,7 +201,7 @@ fn brute_light(kernel: &TestKernel, tables: &[[u32; 4]], record: layout::Light) 
         let [a, b, c] = light.corners;
         let normal = (b - a).cross(c - a);
         light.normal = normal.normalize() * side;
-        let material = (kernel.constants.materials + (leaf.kind & 0xff_ffff) * layout::MATERIAL_TEXELS) as usize;
+        let material = (kernel.constants.materials + record.material * layout::MATERIAL_TEXELS) as usize;
         let material: layout::Material =
             bytemuck::pod_collect_to_vec(&tables[material..material + layout::MATERIAL_TEXELS as usize])[0];
         light.two_sided = material.kind_flags & layout::MATERIAL_DOUBLE_SIDED != 0;

@@ -8,7 +8,7 @@ use crate::common::irradiance::polygon_irradiance;
 use crate::common::kernel::{Random, TestKernel, empty_scene, floats, vector, vector_texel};
 use crate::common::statistics::{Estimate, chi_square_test, normal_upper_tail, sidak};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use sunfleck::layout::{self, CDF_TOTAL, LeafSlot, NONE, SceneArray};
+use sunfleck::layout::{self, CDF_TOTAL, NONE, SceneArray};
 use sunfleck::render::LightChoice;
 use sunfleck::scene::{Environment, Instance, Material, Mesh, Primitive, PunctualKind, PunctualLight, Scene};
 
@@ -107,9 +107,7 @@ fn pick_probability(kernel: &TestKernel, light: usize) -> f64 {
 
 /// World vertices of a triangle, its front counter-clockwise.
 fn world_triangle(kernel: &TestKernel, slot: u32, instance: u32) -> [DVec3; 3] {
-    let slots = &kernel.prepared.arrays[SceneArray::Slots as usize];
-    let leaf: LeafSlot = bytemuck::pod_collect_to_vec(&slots[3 * slot as usize..3 * slot as usize + 3])[0];
-    let [a, b, c] = leaf.vertices.map(|v| Vec3::from(v).as_dvec3());
+    let [a, b, c] = kernel.prepared.triangle(slot).vertices.map(|v| Vec3::from(v).as_dvec3());
     if instance == NONE {
         return [a, b, c].map(|v| v + kernel.prepared.origin);
     }

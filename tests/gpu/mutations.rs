@@ -87,9 +87,13 @@ mutations! {
         caught by "bsdf_delta::refract_reflects_totally_or_not_at_all";
     /// A ray through an edge belongs to neither triangle.
     leaky_edges: "include/trace_bvh.glsl",
-        "(u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)" =>
-        "(u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)",
+        "all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)))" =>
+        "all(greaterThan(edges, vec3(0.0))) || all(lessThan(edges, vec3(0.0)))",
         caught by "watertight::axis_parallel_rays_do_not_leak";
+    /// The edge that two triangles of a leaf share, turned the same way for both.
+    unturned_edge: "include/trace_bvh.glsl",
+        "vec3(cd, da, -ca)" => "vec3(cd, da, ca)",
+        caught by "watertight::closed_meshes_are_watertight";
     /// Boxes that are narrower than what rounding leaves of a ray.
     shrunken_boxes: "include/trace_bvh.glsl",
         "(16.0 * UNIT_ROUNDOFF)" => "(-16.0 * UNIT_ROUNDOFF)",

@@ -6,7 +6,6 @@ use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec3};
 use sunfleck::film::luminance;
-use sunfleck::layout::{LeafSlot, NONE, SceneArray};
 use sunfleck::render::{SamplerKind, Settings};
 
 use crate::common::brute_force::{Triangle, meet, world_triangles};
@@ -62,11 +61,7 @@ fn sixty_four_samples_have_a_fraction_of_the_error() {
 /// pixel, and from there to nine points of each of the lamp's triangles.
 fn pixels_without_edges(kernel: &TestKernel, size: u32) -> Vec<usize> {
     let triangles = world_triangles(kernel);
-    let slots = &kernel.prepared.arrays[SceneArray::Slots as usize];
-    let is_lamp = |triangle: &Triangle| {
-        let slot = 3 * triangle.id[0] as usize;
-        bytemuck::pod_collect_to_vec::<_, LeafSlot>(&slots[slot..slot + 3])[0].light != NONE
-    };
+    let is_lamp = |triangle: &Triangle| kernel.prepared.triangle(triangle.id[0]).light.is_some();
     let points: Vec<DVec3> = triangles.iter().filter(|t| is_lamp(t)).flat_map(|t| lamp_points(&t.vertices)).collect();
     let [origin, forward, right, up] = [
         kernel.constants.camera_origin,

@@ -27,19 +27,17 @@ fn prepared_with(mut material: Material, texels: Option<Texels>) -> Prepared {
     prepared(&scene)
 }
 
-/// The kinds of the leaves of the second material, and the flags of its record.
+/// Whether the triangles of the second material are marked, and the flags of its record.
 fn flags(prepared: &Prepared) -> Vec<(bool, u32)> {
-    let slots = slots(prepared);
-    let leaves = prepared.triangle_slots(&prepared.meshes[0]).map(|slot| bytemuck::cast(slots[slot as usize]));
-    let record = |leaf: &LeafSlot| {
-        let first = prepared.constants.materials + MATERIAL_TEXELS * (leaf.kind & SLOT_MATERIAL_MASK);
+    let triangles = prepared.triangle_slots(&prepared.meshes[0]).map(|number| prepared.triangle(number));
+    let record = |kind: u32| {
+        let first = prepared.constants.materials + MATERIAL_TEXELS * (kind & TRIANGLE_INDEX_MASK);
         let texels = &prepared.arrays[SceneArray::Tables as usize][first as usize..][..MATERIAL_TEXELS as usize];
         *bytemuck::from_bytes::<sunfleck::layout::Material>(bytemuck::cast_slice(texels))
     };
     let modes = MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND;
-    let second = |leaf: &LeafSlot| leaf.vertices[0][2] != leaf_plane(prepared);
-    let leaves: Vec<LeafSlot> = leaves.collect();
-    leaves.iter().filter(|l| second(l)).map(|l| (l.kind & SLOT_ALPHA != 0, record(l).kind_flags & modes)).collect()
+    let second = triangles.filter(|triangle| triangle.vertices[0][2] != leaf_plane(prepared)).map(|t| t.record.kind);
+    second.map(|kind| (kind & TRIANGLE_ALPHA != 0, record(kind).kind_flags & modes)).collect()
 }
 
 /// z of the opaque triangle in rebased space.

@@ -2,32 +2,35 @@
 
 use crate::prepare_support::*;
 use glam::{DAffine3, DVec3, Vec3};
-use sunfleck::layout::{InnerSlot, LeafSlot, SLOT_LEAF};
+use sunfleck::layout::{InnerSlot, LeafSlot};
 use sunfleck::prepare::bounds::Bounds;
-use sunfleck::prepare::bvh::{self, MAX_DEPTH, Primitive, Slot, Tree, decode, inner_slot, validate};
+use sunfleck::prepare::bvh::{self, BvhQuality, MAX_DEPTH, Primitive, Slot, Tree, decode, inner_slot, validate};
 use sunfleck::prepare::{PrepareOptions, Prepared, prepare};
 
-/// Builds a tree over triangles alone and validates it.
+/// Builds trees of every quality over triangles alone and validates them; gives the default one.
 fn build(triangles: &[TriangleVertices]) -> (Vec<Slot>, bvh::TreeContents) {
+    build_with(triangles, BvhQuality::Fast);
+    build_with(triangles, BvhQuality::High);
+    build_with(triangles, BvhQuality::Default)
+}
+
+fn build_with(triangles: &[TriangleVertices], quality: BvhQuality) -> (Vec<Slot>, bvh::TreeContents) {
     let mut primitives: Vec<Primitive> =
         triangles.iter().zip(0..).map(|(&t, i)| Primitive::new(i, &Bounds::around(t))).collect();
-    let tree = Tree::build(&mut primitives);
-    let mut slots = Vec::new();
+    let tree = Tree::build(&mut primitives, quality);
+    let (mut slots, mut found) = (Vec::new(), Vec::new());
     let appended = tree
         .append(&mut slots, |primitive, _| {
-            let vertices = triangles[primitive as usize];
-            bytemuck::cast(LeafSlot { vertices, triangle: primitive, light: 0, kind: SLOT_LEAF })
+            let [a, b, c] = triangles[primitive as usize];
+            found.push(primitive);
+            bytemuck::cast(LeafSlot { vertices: [a, b, c, a] })
         })
         .unwrap();
     assert_eq!(appended.root_slot, 0);
     let contents = validate(&slots, 0, &[]).unwrap();
     assert_eq!(contents.depth, appended.depth);
     assert_eq!(contents.inner_slots, appended.inner_slots as usize);
-    let mut found: Vec<u32> = contents
-        .triangle_slots
-        .iter()
-        .map(|&slot| bytemuck::cast::<Slot, LeafSlot>(slots[slot as usize]).triangle)
-        .collect();
+    assert_eq!(contents.leaf_slots.len(), triangles.len());
     found.sort_unstable();
     assert!(found.iter().copied().eq(0..triangles.len() as u32), "every triangle exactly once");
     (slots, contents)
@@ -75,6 +78,30 @@ fn a_tree_visits_few_slots() {
     let visits = check_hits(&triangles, 200, 8);
     assert!(visits < 80.0, "{visits} inner slots a ray");
     assert!(contents.depth <= 14, "depth {}", contents.depth);
+}
+
+#[test]
+fn high_quality_costs_less() {
+    // Small triangles among a few that are as large as the whole.
+    let mut triangles = random_triangles(&mut Random(17), 20_000, 1.0, 0.01);
+    triangles.extend(random_triangles(&mut Random(19), 2_000, 1.0, 0.3));
+    let cost = |quality| build_with(&triangles, quality).1.sah_cost;
+    let [fast, default, high] = [BvhQuality::Fast, BvhQuality::Default, BvhQuality::High].map(cost);
+    println!("SAH cost: fast {fast:.2}, default {default:.2}, high {high:.2}");
+    assert!(high <= default && default < 0.99 * fast, "{fast} {default} {high}");
+}
+
+#[test]
+fn trees_do_not_depend_on_the_number_of_threads() {
+    let triangles = random_triangles(&mut Random(18), 30_000, 1.0, 0.05);
+    for quality in [BvhQuality::Default, BvhQuality::High] {
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| build_with(&triangles, quality).0)
+        };
+        let one = with(1);
+        assert!(one == with(3) && one == with(8), "{quality}");
+    }
 }
 
 #[test]
@@ -152,12 +179,12 @@ fn points_and_empty_input() {
     let point = [[0.25; 3]; 3];
     build(&[point]);
     build(&vec![point; 100]);
-    let tree = Tree::build(&mut []);
+    let tree = Tree::build(&mut [], BvhQuality::High);
     let mut slots = Vec::new();
     let appended = tree.append(&mut slots, |_, _| unreachable!()).unwrap();
     let contents = validate(&slots, appended.root_slot, &[]).unwrap();
     assert_eq!((contents.depth, contents.inner_slots), (1, 1));
-    assert_eq!(contents.triangle_slots.len(), 0);
+    assert_eq!(contents.leaf_slots.len(), 0);
 }
 
 #[test]
@@ -243,13 +270,11 @@ fn instances_are_hit_as_baked_triangles() {
 
 /// The closest hit that f32 rays in object space find in any instance, boxes aside.
 fn closest_in_instances(prepared: &Prepared, ray: (DVec3, DVec3)) -> Option<f64> {
-    let slots = slots(prepared);
     let mut closest: Option<f64> = None;
     for instance in &prepared.instances {
         let (origin, direction) = to_object(&instance.record, ray.0, ray.1);
         for slot in prepared.triangle_slots(&prepared.meshes[instance.mesh]) {
-            let leaf: LeafSlot = bytemuck::cast(slots[slot as usize]);
-            if let Some(t) = intersect(origin, direction, &leaf.vertices) {
+            if let Some(t) = intersect(origin, direction, &prepared.triangle(slot).vertices) {
                 closest = Some(closest.map_or(t, |least| least.min(t)));
             }
         }

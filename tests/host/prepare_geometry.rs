@@ -3,25 +3,20 @@
 use crate::prepare_support::*;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use sunfleck::layout::*;
-use sunfleck::prepare::{PrepareError, PrepareOptions, Prepared, camera_constants, prepare};
+use sunfleck::prepare::{PrepareError, PrepareOptions, Prepared, PreparedTriangle, camera_constants, prepare};
 use sunfleck::scene::{
     Bsdf, Camera, Filter, Image, Material, Projection, Scene, Texels, Texture, TextureBinding, Wrap,
 };
 
 const UNIT: TriangleVertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-fn leaves(prepared: &Prepared, mesh: usize) -> Vec<LeafSlot> {
-    let slots = slots(prepared);
-    prepared.triangle_slots(&prepared.meshes[mesh]).map(|slot| bytemuck::cast(slots[slot as usize])).collect()
+fn triangles(prepared: &Prepared, mesh: usize) -> Vec<PreparedTriangle> {
+    prepared.triangle_slots(&prepared.meshes[mesh]).map(|number| prepared.triangle(number)).collect()
 }
 
-fn geometric_normal(leaf: &LeafSlot) -> DVec3 {
+fn geometric_normal(leaf: &PreparedTriangle) -> DVec3 {
     let [a, b, c] = leaf.vertices.map(|v| Vec3::from(v).as_dvec3());
     (b - a).cross(c - a).normalize()
-}
-
-fn triangle(prepared: &Prepared, index: u32) -> Triangle {
-    bytemuck::cast(prepared.arrays[SceneArray::Attributes as usize][index as usize])
 }
 
 fn vertex(prepared: &Prepared, index: u32) -> Vertex {
@@ -49,7 +44,7 @@ fn a_scene_far_away_keeps_its_detail() {
         let prepared = prepare(&scene, &PrepareOptions { camera, ..PrepareOptions::default() }).unwrap();
         let origin = prepared.origin;
         assert!((origin - far).abs().max_element() <= 1.0, "the origin is in the scene's bounds");
-        for (vertex, expected) in leaves(&prepared, 0)[0].vertices.iter().zip(UNIT) {
+        for (vertex, expected) in triangles(&prepared, 0)[0].vertices.iter().zip(UNIT) {
             let world = Vec3::from(*vertex).as_dvec3() + origin - far;
             assert!((world - Vec3::from(expected).as_dvec3()).length() < 1e-6);
         }
@@ -78,17 +73,17 @@ fn coordinates_beyond_the_limit_are_refused_by_name() {
 fn a_mirrored_mesh_keeps_its_front_and_its_normals() {
     let transform = DAffine3::from_scale(DVec3::new(-2.0, 1.0, 1.0));
     let baked = prepared(&smooth_scene(&[transform]));
-    let leaf = leaves(&baked, 0)[0];
+    let leaf = triangles(&baked, 0)[0];
     // The front of the unit triangle is +Z, and mirroring in X leaves that side where it is.
     assert_eq!(geometric_normal(&leaf), DVec3::Z);
-    let record = triangle(&baked, leaf.triangle);
-    assert_eq!(record.flags, TRIANGLE_NORMALS);
+    let record = leaf.record;
+    assert_eq!(record.kind, TRIANGLE_NORMALS);
     for index in record.vertices {
         assert_eq!(vertex(&baked, index).normal, [0.0, 0.0, 1.0]);
     }
     let kept = prepared(&smooth_scene(&[transform, DAffine3::from_translation(DVec3::Z)]));
     assert_eq!(kept.instances.iter().map(|i| i.record.mirrored).collect::<Vec<_>>(), [1, 0]);
-    assert_eq!(geometric_normal(&leaves(&kept, 1)[0]), DVec3::Z);
+    assert_eq!(geometric_normal(&triangles(&kept, 1)[0]), DVec3::Z);
 }
 
 /// The angle by which rounding its vertices to f32 can tilt the unit triangle under a transform: displacements of d turn
@@ -116,9 +111,9 @@ fn normals_stay_perpendicular_under_any_invertible_transform() {
         let mut transform = random_transform(&mut random, scale, 3.0);
         transform.matrix3 *= DMat3::from_cols(DVec3::X, DVec3::new(0.7, 1.0, 0.0), DVec3::new(0.2, -0.4, 1.0));
         let prepared = prepared(&smooth_scene(&[transform]));
-        let leaf = leaves(&prepared, 0)[0];
-        let record = triangle(&prepared, leaf.triangle);
-        assert_eq!(record.flags, TRIANGLE_NORMALS);
+        let leaf = triangles(&prepared, 0)[0];
+        let record = leaf.record;
+        assert_eq!(record.kind, TRIANGLE_NORMALS);
         let exact = transform.matrix3.inverse().transpose() * DVec3::Z;
         let normal = DVec3::from(vertex(&prepared, record.vertices[0]).normal.map(f64::from));
         assert!(normal.dot(exact.normalize()) > 1.0 - 1e-6, "{normal} {exact}");
@@ -133,7 +128,7 @@ fn singular_transforms_are_baked_and_flat() {
     let flattened = DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.0));
     let prepared = prepared(&smooth_scene(&[flattened, flattened, DAffine3::IDENTITY]));
     assert_eq!(prepared.instances.len(), 0, "one invertible use is no reason for an instance");
-    let flags: Vec<u32> = leaves(&prepared, 0).iter().map(|leaf| triangle(&prepared, leaf.triangle).flags).collect();
+    let flags: Vec<u32> = triangles(&prepared, 0).iter().map(|leaf| leaf.record.kind).collect();
     assert_eq!(flags.iter().filter(|&&f| f == TRIANGLE_NORMALS).count(), 1);
     assert_eq!(flags.len(), 3);
 }
@@ -151,23 +146,25 @@ fn badly_conditioned_transforms_are_baked() {
 
 #[test]
 fn a_shared_mesh_far_off_its_own_zero_is_recentred() {
-    let triangles = random_triangles(&mut Random(3), 20, 1.0, 0.3).into_iter();
-    let triangles: Vec<TriangleVertices> = triangles.map(|t| t.map(|[x, y, z]| [x + 4096.0, y, z])).collect();
+    let sources = random_triangles(&mut Random(3), 20, 1.0, 0.3).into_iter();
+    let sources: Vec<TriangleVertices> = sources.map(|t| t.map(|[x, y, z]| [x + 4096.0, y, z])).collect();
     let back = DAffine3::from_rotation_translation(DQuat::from_rotation_y(1.0), DVec3::new(0.0, 3.0, 0.0))
         * DAffine3::from_translation(DVec3::NEG_X * 4096.0);
     let transforms = [back, DAffine3::from_translation(DVec3::Y * 5.0) * back];
-    let prepared = prepared(&scene_of(&triangles, &transforms));
-    for leaf in leaves(&prepared, 1) {
-        assert!(leaf.vertices.as_flattened().iter().all(|x| x.abs() < 4.0));
-        let rows = prepared.instances[0].record.object_to_world;
-        let source = triangles[leaf.triangle as usize];
-        for (vertex, original) in leaf.vertices.iter().zip(source) {
-            let world = DVec3::from(
-                rows.map(|r| (0..3).map(|k| f64::from(r[k]) * f64::from(vertex[k])).sum::<f64>() + f64::from(r[3])),
-            );
-            let exact = back.transform_point3(Vec3::from(original).as_dvec3()) - prepared.origin;
-            assert!((world - exact).length() < 1e-5, "{world} {exact}");
-        }
+    let prepared = prepared(&scene_of(&sources, &transforms));
+    let rows = prepared.instances[0].record.object_to_world;
+    let world = |v: [f32; 3]| {
+        DVec3::from(rows.map(|r| (0..3).map(|k| f64::from(r[k]) * f64::from(v[k])).sum::<f64>() + f64::from(r[3])))
+    };
+    let exact = |v: [f32; 3]| back.transform_point3(Vec3::from(v).as_dvec3()) - prepared.origin;
+    let kept = triangles(&prepared, 1);
+    assert_eq!(kept.len(), sources.len());
+    for triangle in kept {
+        assert!(triangle.vertices.as_flattened().iter().all(|x| x.abs() < 4.0));
+        let is_source = |source: &TriangleVertices| {
+            source.iter().zip(triangle.vertices).all(|(&s, v)| (world(v) - exact(s)).length() < 1e-5)
+        };
+        assert_eq!(sources.iter().filter(|source| is_source(source)).count(), 1);
     }
 }
 
@@ -176,7 +173,7 @@ fn attributes_are_kept_only_where_used() {
     let mut scene = smooth_scene(&[DAffine3::IDENTITY]);
     scene.meshes[0].primitives[0].texcoords = Some(vec![[0.25, 0.5]; 3]);
     let untextured = prepared(&scene);
-    assert_eq!(triangle(&untextured, 0).flags, TRIANGLE_NORMALS);
+    assert_eq!(triangles(&untextured, 0)[0].record.kind, TRIANGLE_NORMALS);
     let texels = Texels::Rgba16(vec![[1, 2, 3, 4], [5, 6, 7, 8], [9, 10, 11, 12]]);
     scene.images.push(Image { name: String::new(), width: 3, height: 1, texels });
     scene.textures.push(Texture {
@@ -189,7 +186,7 @@ fn attributes_are_kept_only_where_used() {
     scene.materials[0] =
         Material { base_color_texture: binding, metallic_roughness_texture: binding, ..Material::default() };
     let textured = prepared(&scene);
-    assert_eq!(triangle(&textured, 0).flags, TRIANGLE_NORMALS | TRIANGLE_TEXCOORDS);
+    assert_eq!(triangles(&textured, 0)[0].record.kind, TRIANGLE_NORMALS | TRIANGLE_TEXCOORDS);
     assert_eq!((vertex(&textured, 0).u, vertex(&textured, 2).v), (0.25, 0.5));
     // One image, two headers: colours are sRGB, roughness is not.
     let tables = &textured.arrays[SceneArray::Tables as usize];
@@ -218,7 +215,7 @@ fn unused_materials_are_left_out_and_features_are_listed() {
     assert_eq!(prepared.features.bsdfs, 1 << BSDF_LAMBERTIAN);
     assert_eq!(prepared.features.kept(), ["lambertian"]);
     assert!(prepared.features.dropped().contains(&"glass"));
-    assert_eq!(leaves(&prepared, 0)[0].kind & SLOT_MATERIAL_MASK, 0);
+    assert_eq!(triangles(&prepared, 0)[0].record.kind, 0);
 }
 
 #[test]

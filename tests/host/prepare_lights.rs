@@ -51,8 +51,8 @@ fn by_power(scene: &Scene) -> Prepared {
     prepare(scene, &PrepareOptions { light_choice: LightChoice::Power, ..PrepareOptions::default() }).unwrap()
 }
 
-fn leaf(prepared: &Prepared, slot: u32) -> LeafSlot {
-    bytemuck::cast(slots(prepared)[slot as usize])
+fn light_of(prepared: &Prepared, number: u32) -> Option<u32> {
+    prepared.triangle(number).light
 }
 
 const UNIT: TriangleVertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -76,13 +76,13 @@ fn baked_triangles_know_their_light_and_lights_their_slot() {
     assert_eq!(lights.len(), 2);
     for (index, light) in lights.iter().enumerate() {
         assert_eq!((light.kind, light.instance), (LIGHT_TRIANGLE, NONE));
-        assert_eq!(leaf(&prepared, light.slot).light, index as u32);
+        assert_eq!(light_of(&prepared, light.slot), Some(index as u32));
     }
     let table = light_cdf(&prepared);
     let ratio = cdf::probability(&table, 1) / cdf::probability(&table, 0);
     assert!((ratio - 4.0).abs() < 1e-6, "powers are as areas: {ratio}");
     assert_eq!(prepared.features.lights, 1 << LIGHT_TRIANGLE);
-    let dark = prepared.triangle_slots(&prepared.meshes[0]).filter(|&slot| leaf(&prepared, slot).light == NONE).count();
+    let dark = prepared.triangle_slots(&prepared.meshes[0]).filter(|&slot| light_of(&prepared, slot).is_none()).count();
     assert_eq!(dark, 1);
 }
 
@@ -103,7 +103,7 @@ fn instances_have_lights_of_their_own() {
         for ordinal in 0..2 {
             let number = (instance.record.first_light + ordinal) as usize;
             assert_eq!(lights[number].instance, index as u32);
-            assert_eq!(leaf(&prepared, lights[number].slot).light, ordinal);
+            assert_eq!(light_of(&prepared, lights[number].slot), Some(ordinal));
             let scale = [1.0, 2.0, 3.0][instance.source];
             let area = 0.5 * scale * scale * [1.0, 4.0][ordinal as usize];
             let expected = area / (0.5 * 5.0 * 14.0);
@@ -161,7 +161,7 @@ fn a_textured_triangle_is_a_light_where_its_texels_are_bright() {
         let prepared = prepared(&textured_lamp(texcoords, wrap));
         let lights = lights(&prepared);
         assert_eq!(lights.len(), 1, "{wrap:?}");
-        assert_eq!(leaf(&prepared, lights[0].slot).triangle, 1);
+        assert_eq!(prepared.triangle(lights[0].slot).record.vertices, [3, 4, 5], "the second");
         assert!(prepared.features.emission_textures);
     }
     let all_dark = prepared(&textured_lamp(dark.iter().chain(&dark).copied().collect(), Wrap::Repeat));

@@ -2,8 +2,10 @@
 #![allow(dead_code, unreachable_pub, reason = "each test crate uses its part")]
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use sunfleck::layout::{InnerSlot, InstanceRecord, InstanceSlot, LeafSlot, SLOT_INSTANCE, SLOT_LEAF, SceneArray};
-use sunfleck::prepare::bvh::{Slot, decode, is_present};
+use sunfleck::layout::{
+    InnerSlot, InstanceRecord, InstanceSlot, LeafSlot, SLOT_INNER, SLOT_INSTANCE, SLOT_NO_LEAF, SceneArray,
+};
+use sunfleck::prepare::bvh::{Slot, decode, is_present, triangles_in};
 use sunfleck::prepare::{PrepareOptions, Prepared, prepare};
 use sunfleck::scene::{Instance, Material, Mesh, Primitive, Scene};
 
@@ -68,7 +70,7 @@ pub fn intersect(origin: DVec3, direction: DVec3, triangle: &TriangleVertices) -
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
 }
 
-/// A hit: its parameter, the slot, and the instance.
+/// A hit: its parameter, the triangle's number, and the instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     pub t: f64,
@@ -106,21 +108,23 @@ fn visit(
     while let Some(place) = stack.pop() {
         *visits += 1;
         let inner: InnerSlot = bytemuck::cast(slots[place as usize]);
-        assert_eq!(inner.kind, 0);
+        assert_eq!(inner.kind, SLOT_INNER);
         for index in 0..4 {
             if !is_present(&inner, index) || !hits_box(&inner, index, ray, best) {
                 continue;
             }
             let child = inner.child_group * 4 + index as u32;
             let kind = slots[child as usize][2][3];
-            if kind & SLOT_LEAF != 0 {
-                let leaf: LeafSlot = bytemuck::cast(slots[child as usize]);
-                if let Some(t) = intersect(ray.0, ray.1, &leaf.vertices)
-                    && best.is_none_or(|hit| t < hit.t)
-                {
-                    *best = Some(Hit { t, slot: child, instance: inside });
+            if kind < SLOT_NO_LEAF {
+                let [a, b, c, d] = bytemuck::cast::<Slot, LeafSlot>(slots[child as usize]).vertices;
+                for (triangle, k) in [[a, b, c], [a, c, d]].into_iter().zip(0..triangles_in(&slots[child as usize])) {
+                    if let Some(t) = intersect(ray.0, ray.1, &triangle)
+                        && best.is_none_or(|hit| t < hit.t)
+                    {
+                        *best = Some(Hit { t, slot: 2 * child + k, instance: inside });
+                    }
                 }
-            } else if kind & SLOT_INSTANCE != 0 {
+            } else if kind == SLOT_INSTANCE {
                 let instance: InstanceSlot = bytemuck::cast(slots[child as usize]);
                 let record = &instances[instance.instance as usize];
                 let ray = to_object(record, ray.0, ray.1);

@@ -10,7 +10,8 @@ const GRID_STEPS: u32 = 255;
 /// An inner slot with up to four children. The absent children have lower 255 and upper 0.
 pub fn inner_slot(children: &[Bounds], child_group: u32) -> InnerSlot {
     let bounds = children.iter().fold(Bounds::EMPTY, |union, &child| union.union(child));
-    let mut slot = InnerSlot { lower: [u32::MAX; 3], upper: [0; 3], child_group, kind: SLOT_INNER, ..InnerSlot::default() };
+    let mut slot =
+        InnerSlot { lower: [u32::MAX; 3], upper: [0; 3], child_group, kind: SLOT_INNER, ..InnerSlot::default() };
     for axis in 0..3 {
         let (origin, end) = if children.is_empty() { (0.0, 0.0) } else { (bounds.min[axis], bounds.max[axis]) };
         let exponent = step_exponent(origin, end);
