@@ -1,7 +1,7 @@
 //! The environment that Mesa's lavapipe wants, set before any driver is loaded.
 //!
 //! lavapipe compiles kernels for vectors of 256 bits at most unless `LP_NATIVE_VECTOR_WIDTH` says otherwise. On processors
-//! with AVX-512, 512 bits are faster from Mesa 25 on and slower before (docs/benchmarks). Mesa's shader cache does not
+//! with AVX-512, 512 bits are faster: measured with Mesa 22.3 and 25.0 (docs/benchmarks). Mesa's shader cache does not
 //! know the width a kernel was compiled for, so each width has a folder of its own (`MESA_SHADER_CACHE_DIR`). What the
 //! user has set is left as it is.
 
@@ -17,8 +17,8 @@ const WIDTH_VARIABLE: &str = "LP_NATIVE_VECTOR_WIDTH";
 /// Mesa's variable for the folder of its shader cache.
 const CACHE_VARIABLE: &str = "MESA_SHADER_CACHE_DIR";
 
-/// The first Mesa whose lavapipe is faster with 512 bits than with 256.
-const FIRST_WIDE_MESA: MesaVersion = MesaVersion { major: 25, minor: 0 };
+/// The oldest Mesa whose lavapipe is known to be right and faster with 512 bits.
+const FIRST_WIDE_MESA: MesaVersion = MesaVersion { major: 22, minor: 3 };
 
 /// What was done for lavapipe, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -130,7 +130,7 @@ fn choose(around: &Circumstances) -> DriverEnvironment {
     match around.lavapipes.iter().map(|version| version.filter(|v| *v >= FIRST_WIDE_MESA)).min() {
         None => DriverEnvironment::nothing("there is no lavapipe"),
         Some(None) => DriverEnvironment::nothing(format!(
-            "a lavapipe that is older than Mesa {FIRST_WIDE_MESA}, or of no known version, is slower with 512 bits"
+            "a lavapipe that is older than Mesa {FIRST_WIDE_MESA}, or of no known version, keeps its own width"
         )),
         Some(Some(oldest)) => {
             let width = OsString::from("512");
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn nothing_where_they_are_not() {
-        let old = Some(MesaVersion { major: 22, minor: 3 });
+        let old = Some(MesaVersion { major: 22, minor: 2 });
         for lavapipes in [vec![], vec![old], vec![None], vec![Some(FIRST_WIDE_MESA), old]] {
             assert_eq!(choose(&Circumstances { lavapipes: lavapipes.clone(), ..around() }).set, [], "{lavapipes:?}");
         }
