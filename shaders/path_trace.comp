@@ -46,10 +46,18 @@ void start_sample(inout LaneState lane) {
     lane.ray = Ray(camera.origin, camera.direction, INFINITY, false, NO_TRIANGLE, NO_TRIANGLE);
 }
 
+// Scaled down to a largest component of `most`, in its own colour. Biased: only --clamp-indirect asks for it. A NaN stays,
+// and infinite light becomes one.
+vec3 clamp_light(vec3 light, float most) {
+    float largest = max_component(light);
+    return largest > most ? light * (most / largest) : light;
+}
+
 // Adds the light found after `bounce` scattering events, if the integrator counts them.
 void add_radiance(inout LaneState lane, uint bounce, vec3 light) {
     bool counts = bounce == 0u ? ADDS_EMISSION : (bounce == 1u ? ADDS_DIRECT : ADDS_INDIRECT);
     if (!counts) return;
+    if (CLAMPS_INDIRECT && bounce >= 2u) light = clamp_light(light, constants.clamp_indirect);
     lane.radiance += light;
     accumulate(lane, light);
 }

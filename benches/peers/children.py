@@ -12,6 +12,7 @@ sys.path.insert(0, str(HERE.parents[1] / "scripts"))
 from python_environment import environment, mitsuba_environment  # noqa: E402
 
 BPY = "4.5.15"
+LUXCORE = "2.11.2"
 
 
 def report_environment() -> Path:
@@ -24,6 +25,7 @@ RENDERERS = {
     "sunfleck": (report_environment, "render_sunfleck.py"),
     "mitsuba": (mitsuba_environment, "render_mitsuba.py"),
     "cycles": (lambda: environment(f"cycles-{BPY}", [f"bpy=={BPY}"], "python3.11"), "render_cycles.py"),
+    "luxcore": (lambda: environment(f"luxcore-{LUXCORE}", [f"pyluxcore=={LUXCORE}", "numpy"]), "render_luxcore.py"),
 }
 
 

@@ -27,7 +27,7 @@ TOLERANCE = 0.005
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--scenes", help="names with commas; all seven without it")
-    parser.add_argument("--renderers", default="sunfleck,mitsuba,cycles", help="names with commas")
+    parser.add_argument("--renderers", default="sunfleck,mitsuba,cycles,luxcore", help="names with commas")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--budget", type=float, default=2.0, help="seconds of the longest rendering [2]")
     parser.add_argument("--counts", help="samples per pixel with commas, the same for all, in place of the budget")

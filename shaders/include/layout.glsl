@@ -99,7 +99,7 @@ struct RenderConstants {
     uint light_bvh;
     uint light_bvh_counts;
     uint near_lights;
-    uint unused;
+    float clamp_indirect;
 };
 
 struct SliceConstants {
