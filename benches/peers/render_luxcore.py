@@ -40,16 +40,12 @@ def material_properties(name: str, material) -> dict:
     if material.kind == "glass":
         return {f"{key}.type": "glass", f"{key}.kt": floats(material.colour), f"{key}.kr": floats(material.colour),
                 f"{key}.interiorior": material.ior, f"{key}.exteriorior": 1.0}
-    if material.kind == "metal":
-        # Disney's with metallic 1 is GGX with Schlick's Fresnel and alpha = roughness²; its masking is another.
-        out = {f"{key}.type": "disney", f"{key}.basecolor": floats(material.colour), f"{key}.metallic": 1.0,
-               f"{key}.roughness": material.roughness}
-    else:
-        out = {f"{key}.type": "matte", f"{key}.kd": floats(material.colour)}
+    out = {f"{key}.type": "matte", f"{key}.kd": floats(material.colour)}
     if any(material.emission):
-        # No power and no efficiency: the emission is the radiance.
+        # No power and no efficiency: the emission is the radiance. By itself LuxCore samples no lamp of more than 256
+        # triangles.
         out |= {f"{key}.emission": floats(material.emission), f"{key}.emission.power": 0.0,
-                f"{key}.emission.efficiency": 0.0}
+                f"{key}.emission.efficiency": 0.0, f"{key}.emission.directlightsampling.type": "ENABLED"}
     return out
 
 
@@ -70,15 +66,18 @@ class LuxCore:
         self.version = f"LuxCore {pyluxcore.Version()}"
 
     def prepare(self, name, folder, resolution, options):
-        self.neutral, self.folder, self.resolution = SCENES[name](), Path(folder), resolution
+        self.neutral, self.resolution = SCENES[name](), resolution
 
     def load(self):
         neutral, self.scene = self.neutral, pyluxcore.Scene()
         to_world = neutral.camera_to_world()
-        # A square picture, so the smaller field of view is the vertical one.
+        # A square picture, so the smaller field of view is the vertical one. Row y of LuxCore's film is what its camera sees
+        # at height − 1 − y with a fraction in y: the picture lies one pixel too low, which the window takes back.
+        step = 2 / self.resolution
         values = {"scene.camera.type": "perspective", "scene.camera.lookat.orig": floats(neutral.position),
                   "scene.camera.lookat.target": floats(neutral.target), "scene.camera.up": floats(to_world[:3, 1]),
-                  "scene.camera.fieldofview": neutral.yfov_degrees, "scene.camera.cliphither": 1e-3}
+                  "scene.camera.fieldofview": neutral.yfov_degrees, "scene.camera.cliphither": 1e-3,
+                  "scene.camera.screenwindow": [-1.0, 1.0, -1.0 - step, 1.0 - step]}
         for index, mesh in enumerate(neutral.meshes):
             points = [tuple(point) for point in mesh.positions.astype(float).tolist()]
             triangles = [tuple(triangle) for triangle in mesh.triangles.tolist()]
@@ -86,17 +85,8 @@ class LuxCore:
             more, material = with_black_back(f"material{index}", mesh.material)
             values |= more | {f"scene.objects.object{index}.shape": f"mesh{index}",
                               f"scene.objects.object{index}.material": material}
-        if neutral.environment is not None:
-            values |= self.environment()
         self.scene.Parse(properties(values))
         self.render(1, 0)  # LuxCore builds its BVH at the first rendering and keeps it
-
-    def environment(self) -> dict:
-        key = "scene.lights.environment"
-        return {f"{key}.type": "infinite", f"{key}.file": f"{self.folder}/{self.neutral.name}.hdr",
-                f"{key}.colorspace": "nop", f"{key}.gain": [1.0, 1.0, 1.0], f"{key}.transformation": self.turn}
-
-    turn = floats([1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1])
 
     def settings(self, spp, seed) -> dict:
         # LuxCore counts the vertices after the camera's: the lamp that is met is one.

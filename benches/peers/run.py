@@ -109,7 +109,7 @@ def references(children, images, chosen) -> dict:
 
 
 def compare_scene(name, renderers, chosen) -> dict:
-    from children import Child
+    from children import LACKS, Child, needs
     from gltf import write_hdr
     from measure import equality, errors
     from scenes import SCENES
@@ -117,15 +117,17 @@ def compare_scene(name, renderers, chosen) -> dict:
     scene = SCENES[name]()
     if scene.environment is not None:
         write_hdr(chosen.out / f"{name}.hdr", scene.environment)
+    missing = {renderer: sorted(LACKS.get(renderer, set()) & needs(scene)) for renderer in renderers}
     children = {}
     try:
-        for renderer in renderers:
+        for renderer in (r for r in renderers if not missing[r]):
             options = {"sampler": chosen.mitsuba_sampler}
             children[renderer] = Child(renderer, name, chosen.out, chosen.resolution, options, chosen.timeout)
         images = measured(children, chosen)
         truth = references(children, images, chosen)
         result = {"scene": name, "title": scene.title, "triangles": sum(len(m.triangles) for m in scene.meshes),
-                  "max_bounces": scene.max_bounces, "renderers": {}, "equality": {}}
+                  "max_bounces": scene.max_bounces, "renderers": {}, "equality": {},
+                  "lacks": {renderer: what for renderer, what in missing.items() if what}}
         for renderer, child in children.items():
             rows = [{k: v for k, v in row.items() if k != "image"} | errors(row["image"], truth[renderer])
                     for row in images[renderer]]
