@@ -503,4 +503,4 @@ pub struct BlockResult {
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
-pub const LANE_STATE_BYTES: usize = 272;
+pub const LANE_STATE_BYTES: usize = 288;

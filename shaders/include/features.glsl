@@ -32,6 +32,7 @@ const bool HAS_VOLUME = (FEATURES & 16384u) != 0u;
 const bool HAS_MIP = (FEATURES & 32768u) != 0u;
 const bool HAS_NEAR_LAMPS = (FEATURES & 65536u) != 0u;
 const bool CLAMPS_INDIRECT = (FEATURES & 131072u) != 0u;
+const bool HAS_PANES = (FEATURES & 262144u) != 0u;
 
 #define HAS_BSDF(kind) ((BSDFS & (1u << (kind))) != 0u)
 #define HAS_LIGHT(kind) ((LIGHTS & (1u << (kind))) != 0u)

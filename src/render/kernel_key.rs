@@ -93,6 +93,7 @@ impl KernelKey {
             f.mip,
             f.near_lamps,
             self.clamp_indirect,
+            f.panes,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {

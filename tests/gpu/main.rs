@@ -24,6 +24,7 @@ mod mip;
 mod mitsuba_bsdfs;
 mod mitsuba_images;
 mod mutations;
+mod panes;
 mod plates;
 mod reciprocity;
 mod sampler;
