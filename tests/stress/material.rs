@@ -118,7 +118,7 @@ fn albedo(material: Material, cosine: f64) -> Estimate {
     let mut scene = furnace(vec![plane], vec![material]);
     let sine = (1.0 - cosine * cosine).sqrt();
     scene.cameras = vec![camera(DVec3::new(0.0, cosine, sine), DVec3::ZERO, 1e-4 * cosine)];
-    mean(&scene, &settings(8), SEEDS, 64)[1]
+    mean(&scene, &settings(8), 4 * SEEDS, 64)[1]
 }
 
 /// Energy: a white metal and a white dielectric give back what they get, to the accuracy of the albedo table.
@@ -137,7 +137,8 @@ fn roughness_from_zero_to_one_is_finite_and_bounded() {
                     mean.mean,
                     mean.standard_error()
                 );
-                let slack = 4.0 * mean.standard_error();
+                // Of 64 t-tests with 31 degrees of freedom one fails by chance with probability 1e-3.
+                let slack = 5.0 * mean.standard_error();
                 assert!(mean.mean >= 0.99 - slack && mean.mean <= 1.001 + slack, "{mean:?}");
             }
         }
