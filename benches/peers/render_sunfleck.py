@@ -29,7 +29,7 @@ class Sunfleck:
 
     def prepare(self, name, folder, resolution, options):
         self.folder, self.resolution = Path(folder), resolution
-        self.neutral = SCENES[name]()
+        self.neutral, self.flags = SCENES[name](), options.get("flags", [])
         self.file = write_gltf(self.neutral, self.folder)
 
     def load(self):
@@ -39,7 +39,7 @@ class Sunfleck:
         out = self.folder / f"sunfleck-{self.neutral.name}.exr"
         command = [self.binary, "render", self.file, "-o", out, "--resolution", f"{self.resolution}x{self.resolution}",
                    "--spp", str(spp), "--seed", str(seed), "--max-bounces", str(self.neutral.max_bounces),
-                   "--json", "--quiet", "--strict"]
+                   "--json", "--quiet", "--strict", *self.flags]
         if self.neutral.environment is not None:
             command += ["--env", self.folder / f"{self.neutral.name}.hdr"]
         before = time.perf_counter()

@@ -44,12 +44,13 @@ def arguments():
     return chosen
 
 
-def enter_environment() -> None:
+def enter_environment(script=HERE / "run.py") -> None:
+    """Goes on in the interpreter that has this program's packages, at the beginning of `script`."""
     from children import report_environment
 
     python = report_environment()
     if Path(sys.prefix) != python.parent.parent:
-        os.execv(python, [str(python), str(HERE / "run.py"), *sys.argv[1:]])
+        os.execv(python, [str(python), str(script), *sys.argv[1:]])
 
 
 def processor() -> str:
@@ -166,9 +167,9 @@ def main() -> int:
         return 4
     from children import RENDERERS, ChildFailed
     from report import write_report
-    from scenes import SCENES
+    from scenes import COMPARED, SCENES
 
-    wanted, scenes = chosen.renderers.split(","), chosen.scenes.split(",") if chosen.scenes else list(SCENES)
+    wanted, scenes = chosen.renderers.split(","), chosen.scenes.split(",") if chosen.scenes else list(COMPARED)
     for kind, names, known in (("renderer", wanted, RENDERERS), ("scene", scenes, SCENES)):
         if unknown := set(names) - set(known):
             print(f"error: no {kind} {', '.join(sorted(unknown))}; there are {', '.join(known)}", file=sys.stderr)

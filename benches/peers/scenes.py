@@ -117,12 +117,28 @@ def cornell(boxes=True) -> Scene:
     return scene
 
 
-def million() -> Scene:
-    """The box with a bumpy sphere of 998,000 triangles in place of the two boxes."""
+def bumpy(name, title, n) -> Scene:
+    """The box with a bumpy sphere of 4n(n − 1) triangles in place of the two boxes."""
     scene = cornell(boxes=False)
-    scene.name, scene.title = "million", "A mesh of a million triangles"
-    scene.add(scene.meshes[1].material, sphere((0, -0.3, 0), 0.6, n=500, bumps=1))
+    scene.name, scene.title = name, title
+    scene.add(scene.meshes[1].material, sphere((0, -0.3, 0), 0.6, n=n, bumps=1))
     return scene
+
+
+def million() -> Scene:
+    return bumpy("million", "A mesh of a million triangles", 500)
+
+
+def bumpy_9k() -> Scene:
+    return bumpy("bumpy_9k", "A mesh of 9,800 triangles", 50)
+
+
+def bumpy_159k() -> Scene:
+    return bumpy("bumpy_159k", "A mesh of 159,200 triangles", 200)
+
+
+def bumpy_2m() -> Scene:
+    return bumpy("bumpy_2m", "A mesh of 1,957,200 triangles", 700)
 
 
 def plates() -> Scene:
@@ -244,4 +260,7 @@ def emitters(lit=10_000) -> Scene:
     return scene
 
 
-SCENES = {make.__name__: make for make in (cornell, plates, sun, caustic, lights, emitters, million)}
+SCENES = {make.__name__: make for make in (cornell, plates, sun, caustic, lights, emitters, million, bumpy_9k, bumpy_159k,
+                                            bumpy_2m)}
+# What run.py renders without --scenes; the others are for speed.py.
+COMPARED = ("cornell", "plates", "sun", "caustic", "lights", "emitters", "million")

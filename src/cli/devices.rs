@@ -2,7 +2,7 @@
 
 use clap::Args;
 use serde_json::json;
-use sunfleck::gpu::{self, DeviceInfo, DeviceSelection, Instance};
+use sunfleck::gpu::{self, DeviceInfo, DeviceSelection, Instance, driver_environment};
 use sunfleck::render::{TraceChoice, choose_trace};
 
 use super::print_json;
@@ -22,12 +22,24 @@ pub(crate) fn run(args: &DevicesArgs) -> anyhow::Result<()> {
     let default = gpu::select(&devices, &DeviceSelection::Auto).ok().map(|(device, _)| device.index);
     if args.json {
         let list: Vec<_> = devices.iter().map(|d| describe_json(d, default)).collect();
-        return print_json(&json!({ "devices": list }));
+        return print_json(&json!({ "devices": list, "driver_environment": environment_json() }));
     }
     for device in &devices {
         describe(device, default);
     }
+    if let Some(environment) = driver_environment() {
+        println!("environment for lavapipe: {environment}");
+    }
     Ok(())
+}
+
+/// What was set for lavapipe, by variable, and why.
+pub(super) fn environment_json() -> serde_json::Value {
+    driver_environment().map_or(serde_json::Value::Null, |environment| {
+        let set: serde_json::Map<_, _> =
+            environment.set.iter().map(|(name, value)| ((*name).into(), json!(value.to_string_lossy()))).collect();
+        json!({ "set": set, "reason": environment.reason })
+    })
 }
 
 fn describe(d: &DeviceInfo, default: Option<usize>) {

@@ -9,7 +9,7 @@ use sunfleck::scene::{AlphaMode, Bsdf, Environment, Lobe, Material, Projection, 
 use sunfleck::prepare::Prepared;
 use sunfleck::render::{Settings, prepare_scene};
 
-use super::{print_json, print_warnings};
+use super::{devices, print_json, print_warnings};
 
 /// Say what is in a scene, what was added to it and what is skipped.
 #[derive(Args, Debug)]
@@ -32,9 +32,13 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
     let prepared = prepare_scene(&scene, &scene.cameras[0], &Settings::default())?;
     print_for_people(&scene);
     print_prepared(&prepared);
+    if let Some(environment) = sunfleck::gpu::driver_environment() {
+        eprintln!("  lavapipe     {environment}");
+    }
     if args.json {
         let mut object = describe(&scene);
         object["prepared"] = describe_prepared(&prepared);
+        object["driver_environment"] = devices::environment_json();
         print_json(&object)?;
     }
     Ok(())

@@ -19,6 +19,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "device": result.device,
         "driver": result.driver,
         "device_reason": result.device_reason,
+        "driver_environment": super::devices::environment_json(),
         "trace": result.trace,
         "kernel_key": result.kernel_key,
         "features": result.features,
