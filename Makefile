@@ -43,7 +43,7 @@ references: ## makes the reference images and values again with Mitsuba 3 (a qua
 	python3 tests/reference/make_bsdf_table.py
 	python3 tests/reference/make_bsdf_images.py
 
-bench-peers: build ## time against error beside Mitsuba 3 and Cycles, seven scenes (a quarter of an hour)
+bench-peers: build ## time against error beside Mitsuba 3, Cycles and LuxCore, seven scenes (a quarter of an hour)
 	python3 benches/peers/run.py
 
 bench-peers-short: build ## the short form of it for CI: Mitsuba alone, one scene
