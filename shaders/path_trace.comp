@@ -30,7 +30,9 @@ layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 const uint BOUNCE_CAP = 65535u;
 
 SampleKey sample_key(LaneState lane) { return SampleKey(lane.pixel, lane.sample_index, constants.seed); }
-uvec2 alpha_key(LaneState lane) { return alpha_key(sample_key(lane), lane.bounce, lane.ray.any_hit); }
+// A shadow ray that may pass panes looks for the nearest surface, as a path's ray does.
+bool is_shadow_ray(LaneState lane) { return lane.ray.any_hit || (HAS_PANES && lane.pane_search != 0u); }
+uvec2 alpha_key(LaneState lane) { return alpha_key(sample_key(lane), lane.bounce, is_shadow_ray(lane)); }
 
 void start_sample(inout LaneState lane) {
     lane.bounce = 0u;
@@ -39,6 +41,7 @@ void start_sample(inout LaneState lane) {
     lane.radiance_scale = 1.0;
     lane.pdf = 0.0;
     lane.emission_weight = WEIGHT_FULL;
+    lane.passed = 0.0;
     if (HAS_VOLUME) lane.media = OUTSIDE;
     vec4 u = to_unit(sample_bits(sample_key(lane), 0u, DIMENSIONS_FILM));
     CameraRay camera = camera_ray(constants, uvec2(lane.pixel & 0xffffu, lane.pixel >> 16u), u);
@@ -46,10 +49,18 @@ void start_sample(inout LaneState lane) {
     lane.ray = Ray(camera.origin, camera.direction, INFINITY, false, NO_TRIANGLE, NO_TRIANGLE);
 }
 
+// Scaled down to a largest component of `most`, in its own colour. Biased: only --clamp-indirect asks for it. A NaN stays,
+// and infinite light becomes one.
+vec3 clamp_light(vec3 light, float most) {
+    float largest = max_component(light);
+    return largest > most ? light * (most / largest) : light;
+}
+
 // Adds the light found after `bounce` scattering events, if the integrator counts them.
 void add_radiance(inout LaneState lane, uint bounce, vec3 light) {
     bool counts = bounce == 0u ? ADDS_EMISSION : (bounce == 1u ? ADDS_DIRECT : ADDS_INDIRECT);
     if (!counts) return;
+    if (CLAMPS_INDIRECT && bounce >= 2u) light = clamp_light(light, constants.clamp_indirect);
     lane.radiance += light;
     accumulate(lane, light);
 }
@@ -75,7 +86,7 @@ void add_emission(inout LaneState lane, Surface surface, Hit hit) {
     float pdf = 0.0;
     if (HAS_LIGHT(LIGHT_TRIANGLE) && surface.light != NONE && lane.emission_weight != WEIGHT_FULL)
         pdf = triangle_light_pdf(constants, lane.receiver, surface.light, hit.triangle, surface.point, lane.ray.direction,
-                                 hit.t);
+                                 HAS_PANES ? lane.passed + hit.t : hit.t);
     add_radiance(lane, lane.bounce, lane.throughput * surface.emission * emission_weight(lane, pdf));
 }
 
@@ -148,8 +159,22 @@ RayCone scattered_cone(RayCone cone, Surface surface, BsdfSample scattered, vec3
     return delta_cone(cone, surface.curved, through, surface.bsdf.eta, abs(wo.y), cos_t);
 }
 
+// Light sampling at the last vertex that is no pane also looks through panes. So behind a pane a path goes on as if none had
+// been there: `before` is where light was last looked for.
+void remember_scattering(inout LaneState lane, Surface surface, BsdfSample scattered, float distance, LightReceiver before) {
+    const uint STRAIGHT = SCATTERED_DELTA | SCATTERED_THROUGH;
+    if (HAS_PANES && (scattered.flags & STRAIGHT) == STRAIGHT && bsdf_is_pane(surface.bsdf)) {
+        lane.passed += distance;
+        lane.receiver = before;
+        return;
+    }
+    lane.emission_weight = scattered_emission_weight(lane, scattered);
+    lane.pdf = scattered.pdf;
+    lane.passed = 0.0;
+}
+
 // Draws the next direction and stores its ray; false if the path ends here.
-bool scatter(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle) {
+bool scatter(inout LaneState lane, Surface surface, vec3 wo, Hit hit, LightReceiver before) {
     vec4 u = to_unit(sample_bits(sample_key(lane), lane.bounce, DIMENSIONS_SCATTER));
     BsdfSample scattered = surface_scatter(surface, wo, u.xyz);
     bool through = (scattered.flags & SCATTERED_THROUGH) != 0u;
@@ -159,12 +184,11 @@ bool scatter(inout LaneState lane, Surface surface, vec3 wo, TriangleId triangle
         if (HAS_VOLUME) lane.media = surface.far;
     }
     if (max_component(lane.throughput) == 0.0 || !survives_roulette(lane, u.w)) return false;
-    lane.emission_weight = scattered_emission_weight(lane, scattered);
-    lane.pdf = scattered.pdf;
+    remember_scattering(lane, surface, scattered, hit.t, before);
     if (HAS_MIP) lane.cone = scattered_cone(lane.cone, surface, scattered, wo);
     lane.next_origin = scattered_origin(surface, through);
     lane.next_direction = safe_normalize(scattered.wi);
-    lane.next_from = scattered_from(surface, triangle, scattered.wi, through);
+    lane.next_from = scattered_from(surface, hit.triangle, scattered.wi, through);
     return true;
 }
 
@@ -182,7 +206,38 @@ void follow_scattered(inout LaneState lane) {
     lane.bounce += 1u;
 }
 
-// A path's ray has come back: adds what it met and prepares the next ray. False if the path ends.
+// The shadow ray is done: its light is added if nothing was in its way. Each pane that it passed is a scattering event.
+bool finish_shadow(inout LaneState lane, bool free) {
+    uint panes = HAS_PANES && lane.pane_search != 0u ? lane.pane_search - 1u : 0u;
+    if (free) add_radiance(lane, lane.bounce + 1u + panes, lane.shadow_light);
+    lane.pane_search = 0u;
+    if (lane.path_ends != 0u) return false;
+    follow_scattered(lane);
+    return true;
+}
+
+// Whether the shadow ray has met something that may be a pane; then the nearest surface is looked for from here on.
+bool may_be_pane(Hit hit) {
+    if (hit.triangle.slot == NONE) return false;
+    Material material = load_material(constants, load_triangle(hit.triangle.slot).material);
+    return material.transmission > 0.0 && (material.kind_flags & MATERIAL_VOLUME) == 0u;
+}
+
+// Sends the shadow ray on behind a pane; false if the surface is none, or the path would have too many events.
+bool passes_pane(inout LaneState lane, Surface surface, Hit hit) {
+    uint events = lane.bounce + 1u + lane.pane_search;
+    if (surface.black || !bsdf_is_pane(surface.bsdf) || events > min(constants.max_bounces, BOUNCE_CAP)) return false;
+    lane.shadow_light *= pane_transmittance(surface.bsdf);
+    if (max_component(lane.shadow_light) <= 0.0) return false;
+    lane.pane_search += 1u;
+    vec3 direction = lane.ray.direction;
+    TriangleId from = scattered_from(surface, hit.triangle, direction, true);
+    lane.ray = Ray(scattered_origin(surface, true), direction, lane.ray.t_max - hit.t, false, from, lane.ray.towards);
+    return true;
+}
+
+// A ray that looks for the nearest surface has come back: adds what it met and prepares the next ray. False if the path
+// ends.
 bool shade(inout LaneState lane, Hit hit) {
     if (hit.triangle.slot == NONE) {
         if (HAS_VOLUME) lane.throughput *= transmittance(constants, lane.media, INFINITY);
@@ -190,8 +245,11 @@ bool shade(inout LaneState lane, Hit hit) {
         return false;
     }
     vec3 view = -lane.ray.direction;
-    if (HAS_MIP) lane.cone.width = cone_width(lane.cone, hit.t);
-    Surface surface = surface_at(constants, hit, view, lane.media, lane.cone.width);
+    // A shadow ray has the scattered ray's cone, and leaves it as it is.
+    float width = HAS_MIP ? cone_width(lane.cone, hit.t) : 0.0;
+    Surface surface = surface_at(constants, hit, view, lane.media, width);
+    if (HAS_PANES && lane.pane_search != 0u) return passes_pane(lane, surface, hit) || finish_shadow(lane, false);
+    if (HAS_MIP) lane.cone.width = width;
     if (HAS_VOLUME) {
         lane.media = surface.near;
         lane.throughput *= transmittance(constants, lane.media, hit.t);
@@ -204,8 +262,9 @@ bool shade(inout LaneState lane, Hit hit) {
     }
     vec3 wo = to_local(surface.frame, view);
     // The shadow ray replaces lane.ray; its contribution uses the throughput before scattering.
+    LightReceiver before = lane.receiver;
     bool shadow = sample_direct_light(lane, surface, wo, hit.triangle);
-    bool goes_on = scatter(lane, surface, wo, hit.triangle);
+    bool goes_on = scatter(lane, surface, wo, hit, before);
     lane.path_ends = goes_on ? 0u : 1u;
     if (shadow) return true;
     if (goes_on) follow_scattered(lane);
@@ -215,11 +274,16 @@ bool shade(inout LaneState lane, Hit hit) {
 // The lane's ray has been traced. False if the sample is finished.
 bool advance_path(inout LaneState lane, Hit hit) {
     lane.rays += 1u;
-    if (!lane.ray.any_hit) return shade(lane, hit);
-    if (hit.triangle.slot == NONE) add_radiance(lane, lane.bounce + 1u, lane.shadow_light);
-    if (lane.path_ends != 0u) return false;
-    follow_scattered(lane);
-    return true;
+    if (!is_shadow_ray(lane)) return shade(lane, hit);
+    if (HAS_PANES && lane.ray.any_hit && may_be_pane(hit)) {
+        lane.ray.any_hit = false;
+        lane.pane_search = 1u;
+        return true;
+    }
+    bool free = hit.triangle.slot == NONE;
+    // The other case first asks what was met.
+    if (HAS_PANES && lane.pane_search != 0u && !free) return shade(lane, hit);
+    return finish_shadow(lane, free);
 }
 
 void main() {

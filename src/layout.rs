@@ -458,8 +458,8 @@ pub struct RenderConstants {
     pub light_bvh_counts: u32,
     /// Lights in it: those with a place, which come first.
     pub near_lights: u32,
-    /// Unused, zero.
-    pub unused: u32,
+    /// Most that a path may bring at once after two scattering events or more, largest component; 0 without a bound.
+    pub clamp_indirect: f32,
 }
 
 /// What a dispatch does: lanes `0..lanes` render the atoms (block `first_block` + a / pixels, pixel a mod pixels) with
@@ -507,4 +507,4 @@ pub struct BlockResult {
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
-pub const LANE_STATE_BYTES: usize = 272;
+pub const LANE_STATE_BYTES: usize = 288;

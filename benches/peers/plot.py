@@ -6,7 +6,7 @@ import numpy
 matplotlib.use("Agg")
 import matplotlib.pyplot as pyplot  # noqa: E402
 
-COLOURS = {"sunfleck": "#d95f02", "mitsuba": "#1b6ca8", "cycles": "#4d9221"}
+COLOURS = {"sunfleck": "#d95f02", "mitsuba": "#1b6ca8", "cycles": "#4d9221", "luxcore": "#8856a7"}
 
 
 def by_count(rows, key, whole=0.0):

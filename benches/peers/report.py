@@ -65,5 +65,7 @@ def write_report(results, path) -> None:
         text += [f"### {result['title']}", "",
                  f"`{result['scene']}`: {result['triangles']:,} triangles, at most {result['max_bounces']} bounces. "
                  f"{versions}.", "", f"![time against error](peers/{result['scene']}.svg)", ""]
+        text += [f"Not rendered by {name}, which has no equal {' and '.join(what)}.\n" for name, what in
+                 result["lacks"].items()]
         text += times_table(result) + [""] + ratio_lines(result) + [""] + equality_lines(result) + [""]
     path.write_text("\n".join(text))

@@ -27,7 +27,7 @@ TOLERANCE = 0.005
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--scenes", help="names with commas; all seven without it")
-    parser.add_argument("--renderers", default="sunfleck,mitsuba,cycles", help="names with commas")
+    parser.add_argument("--renderers", default="sunfleck,mitsuba,cycles,luxcore", help="names with commas")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--budget", type=float, default=2.0, help="seconds of the longest rendering [2]")
     parser.add_argument("--counts", help="samples per pixel with commas, the same for all, in place of the budget")
@@ -110,7 +110,7 @@ def references(children, images, chosen) -> dict:
 
 
 def compare_scene(name, renderers, chosen) -> dict:
-    from children import Child
+    from children import LACKS, Child, needs
     from gltf import write_hdr
     from measure import equality, errors
     from scenes import SCENES
@@ -118,15 +118,17 @@ def compare_scene(name, renderers, chosen) -> dict:
     scene = SCENES[name]()
     if scene.environment is not None:
         write_hdr(chosen.out / f"{name}.hdr", scene.environment)
+    missing = {renderer: sorted(LACKS.get(renderer, set()) & needs(scene)) for renderer in renderers}
     children = {}
     try:
-        for renderer in renderers:
+        for renderer in (r for r in renderers if not missing[r]):
             options = {"sampler": chosen.mitsuba_sampler}
             children[renderer] = Child(renderer, name, chosen.out, chosen.resolution, options, chosen.timeout)
         images = measured(children, chosen)
         truth = references(children, images, chosen)
-        result = {"scene": name, "title": scene.title, "triangles": sum(len(m.triangles) for m in scene.meshes),
-                  "max_bounces": scene.max_bounces, "renderers": {}, "equality": {}}
+        result = {"scene": name, "title": scene.title, "triangles": scene.triangle_count(),
+                  "max_bounces": scene.max_bounces, "renderers": {}, "equality": {},
+                  "lacks": {renderer: what for renderer, what in missing.items() if what}}
         for renderer, child in children.items():
             rows = [{k: v for k, v in row.items() if k != "image"} | errors(row["image"], truth[renderer])
                     for row in images[renderer]]

@@ -64,6 +64,15 @@ vec3 base_albedo(BsdfParameters p) {
 float diffuse_share(BsdfParameters p) { return HAS_TRANSMISSION || HAS_VOLUME ? 1.0 - p.transmission : 1.0; }
 float through_share(BsdfParameters p) { return HAS_TRANSMISSION && !(HAS_VOLUME && p.solid) ? p.transmission : 0.0; }
 
+// A pane: a clear thin wall, behind which light goes on as it came.
+bool bsdf_is_pane(BsdfParameters p) {
+    return HAS_TRANSMISSION && HAS_BSDF(BSDF_METALLIC_ROUGHNESS) && p.kind == BSDF_METALLIC_ROUGHNESS &&
+           through_share(p) > 0.0 && ggx_is_delta(p);
+}
+
+// What of the light goes straight through a pane.
+vec3 pane_transmittance(BsdfParameters p) { return base_albedo(p) * through_share(p); }
+
 // Probabilities of the lobes (specular, diffuse, through, dielectric boundary): their albedos.
 vec4 lobe_probabilities(BsdfParameters p) {
     float base = luminance(base_albedo(p));
@@ -137,8 +146,7 @@ BsdfSample metallic_roughness_scatter(BsdfParameters p, vec3 wo, vec3 u) {
     bool through = u.x >= end.x;
     if (ggx_is_delta(p)) {
         if (through)
-            return BsdfSample(-wo, base_albedo(p) * (through_share(p) / probability.z), 0.0,
-                              SCATTERED_DELTA | SCATTERED_THROUGH);
+            return BsdfSample(-wo, pane_transmittance(p) / probability.z, 0.0, SCATTERED_DELTA | SCATTERED_THROUGH);
         return BsdfSample(reflect_local(wo), specular_albedo(p, specular_term(p)) / probability.x, 0.0, SCATTERED_DELTA);
     }
     vec3 h = sample_visible_normal(wo, p.alpha, ggx_bound(wo, p.alpha), u.yz);

@@ -31,6 +31,8 @@ const bool HAS_TRANSMISSION = (FEATURES & 8192u) != 0u;
 const bool HAS_VOLUME = (FEATURES & 16384u) != 0u;
 const bool HAS_MIP = (FEATURES & 32768u) != 0u;
 const bool HAS_NEAR_LAMPS = (FEATURES & 65536u) != 0u;
+const bool CLAMPS_INDIRECT = (FEATURES & 131072u) != 0u;
+const bool HAS_PANES = (FEATURES & 262144u) != 0u;
 
 // Whether triangles have records with vertices, or only their kinds.
 const bool HAS_ATTRIBUTES = HAS_NORMALS || HAS_TEXTURES || HAS_NORMAL_MAPS || HAS_ANISOTROPY || HAS_VERTEX_COLORS;

@@ -36,6 +36,8 @@ struct LaneState {
     RayCone cone;          // of the path's ray, or after the shadow ray of the scattered one
     LightReceiver receiver; // the last vertex, as light sampling saw it
     Media media;           // that the path's ray, or after the shadow ray the scattered one, is in
+    uint pane_search;      // the shadow ray looks for the nearest surface: 1 + panes passed; else 0
+    float passed;          // from the last vertex that was no pane to the origin of the path's ray
 };
 
 // Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
@@ -79,6 +81,8 @@ LaneState new_lane(RenderConstants constants, SliceConstants slice, uint index) 
     lane.cone = RayCone(0.0, 0.0);
     lane.receiver = LightReceiver(vec3(0.0), 0.0, vec3(0.0));
     lane.media = OUTSIDE;
+    lane.pane_search = 0u;
+    lane.passed = 0.0;
     return lane;
 }
 

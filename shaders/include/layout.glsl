@@ -102,7 +102,7 @@ struct RenderConstants {
     uint light_bvh;
     uint light_bvh_counts;
     uint near_lights;
-    uint unused;
+    float clamp_indirect;
 };
 
 struct SliceConstants {

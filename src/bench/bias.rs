@@ -59,6 +59,10 @@ pub struct Region {
 
 /// Compares an image with the reference.
 ///
+/// Where light comes from few bright samples, a short run may have met none of them: then its mean is low, and its variance,
+/// which is taken from it, far too low. The reference has met them, and its variance says what they do to fewer samples; see
+/// [`expected_of_fewer`].
+///
 /// # Panics
 /// If the sizes differ or are zero.
 pub fn find_bias(image: &MeanImage, reference: &MeanImage) -> BiasVerdict {
@@ -129,7 +133,23 @@ fn regions(
             }
         }
     }
-    [0, 1, 2].map(|channel| welch(tile, channel, sums[channel]))
+    let ratio = image.spp.zip(reference.spp).map(|(own, other)| other / own).filter(|ratio| *ratio > 1.0);
+    [0, 1, 2].map(|channel| {
+        let [own, other] = sums[channel];
+        let own = ratio.map_or(own, |ratio| expected_of_fewer(own, other, ratio));
+        welch(tile, channel, [own, other])
+    })
+}
+
+/// The image's sums, with the variance of the reference for as few samples as the image has where that is more: the variance
+/// of a mean falls at least as fast as one over the samples, so for fewer of them it is at least that much larger. Two ways to
+/// sample the same light differ in variance, but neither lacks what the other has met.
+fn expected_of_fewer(own: Sums, reference: Sums, ratio: f64) -> Sums {
+    let variance = ratio * reference.variance;
+    if variance <= own.variance {
+        return own;
+    }
+    Sums { variance, variance_squared: ratio * ratio * reference.variance_squared, ..own }
 }
 
 /// Welch's test. Pixels share no random number, so that the variances of a region's pixels add up; the degrees of

@@ -16,6 +16,8 @@ pub struct MeanImage {
     pub variance: Vec<[f64; 3]>,
     /// Degrees of freedom of each variance: independent images less one; infinite where it is known well.
     pub degrees_of_freedom: f64,
+    /// Samples per pixel behind the mean; `None` if that is not known.
+    pub spp: Option<f64>,
 }
 
 impl MeanImage {
@@ -42,7 +44,8 @@ impl MeanImage {
             _ => vec![[0.0; 3]; mean.len()],
         };
         let (width, height) = (image.width, image.height);
-        Some(Self { width, height, mean, variance, degrees_of_freedom: f64::INFINITY })
+        let spp = image.metadata.samples_per_pixel.map(f64::from);
+        Some(Self { width, height, mean, variance, degrees_of_freedom: f64::INFINITY, spp })
     }
 }
 
@@ -61,6 +64,7 @@ pub struct ImageAccumulator {
     width: u32,
     height: u32,
     count: f64,
+    spp: f64,
     mean: Vec<[f64; 3]>,
     squares: Vec<[f64; 3]>,
 }
@@ -69,16 +73,17 @@ impl ImageAccumulator {
     /// Without an image yet.
     pub fn new((width, height): (u32, u32)) -> Self {
         let pixels = width as usize * height as usize;
-        Self { width, height, count: 0.0, mean: vec![[0.0; 3]; pixels], squares: vec![[0.0; 3]; pixels] }
+        Self { width, height, count: 0.0, spp: 0.0, mean: vec![[0.0; 3]; pixels], squares: vec![[0.0; 3]; pixels] }
     }
 
-    /// Takes in one image.
+    /// Takes in one image of so many samples per pixel.
     ///
     /// # Panics
     /// If it has another number of pixels.
-    pub fn add(&mut self, radiance: &[[f32; 3]]) {
+    pub fn add(&mut self, radiance: &[[f32; 3]], spp: f64) {
         assert_eq!(radiance.len(), self.mean.len(), "images of different sizes");
         self.count += 1.0;
+        self.spp += spp;
         for ((mean, squares), value) in self.mean.iter_mut().zip(&mut self.squares).zip(radiance) {
             for channel in 0..3 {
                 let value = f64::from(value[channel]);
@@ -107,6 +112,7 @@ impl ImageAccumulator {
             mean: self.mean,
             variance: self.squares.iter().map(|pixel| pixel.map(|c| c / divisor)).collect(),
             degrees_of_freedom: self.count - 1.0,
+            spp: Some(self.spp),
         }
     }
 }

@@ -127,12 +127,12 @@ impl Images {
                     run => run?,
                 };
                 let radiance = run.film.radiance();
-                if row + 1 == plan.rows.len() {
-                    mean.add(&radiance);
-                }
                 render_seconds += run.seconds;
                 tracing::info!("seed {seed}, {budget}: {:.3} s", run.seconds);
                 let (spp, seconds) = (run.film.mean_samples_per_pixel(), run.seconds);
+                if row + 1 == plan.rows.len() {
+                    mean.add(&radiance, spp);
+                }
                 rows[row].push(SeedRun { seed, spp, seconds, errors: reference.errors_of(&radiance) });
             }
         }

@@ -51,9 +51,10 @@ pub(super) fn render(
     let (mut seconds, mut spp) = (0.0, 0.0);
     for seed in (0..REFERENCE_PARTS).map(|n| first_seed.wrapping_add(n)) {
         let run = work.render(&mut tracer, seed, budget.part(REFERENCE_PARTS))?;
-        image.add(&run.film.radiance());
+        let part_spp = run.film.mean_samples_per_pixel();
+        image.add(&run.film.radiance(), part_spp);
         seconds += run.seconds;
-        spp += run.film.mean_samples_per_pixel();
+        spp += part_spp;
     }
     let mut description = format!("own run with --light-sampling {}", other.light_sampling);
     if other_device.is_some() {

@@ -193,10 +193,10 @@ impl Side {
         if has_pixel_without_sample(&image) {
             return Err(too_short(budget));
         }
-        if last {
-            self.mean.add(&radiance);
-        }
         let (spp, render_seconds) = (self.number("/spp")?, self.number("/seconds/render")?);
+        if last {
+            self.mean.add(&radiance, spp);
+        }
         Ok(Sample { spp, render_seconds, process_seconds, mse: reference.errors_of(&radiance).mse })
     }
 

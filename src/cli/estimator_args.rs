@@ -37,6 +37,10 @@ pub(crate) struct EstimatorArgs {
     /// How --light-sampling mis weighs its samples.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<MisHeuristic>(MisHeuristic::NAMES), help_heading = "Light transport")]
     mis: MisHeuristic,
+    /// Cut light that arrives after two or more scattering events down to X (largest component): fewer fireflies, but the
+    /// image is too dark wherever it acts. Reports and images say so.
+    #[arg(long, value_name = "X", value_parser = parse::positive_f32, help_heading = "Light transport")]
+    clamp_indirect: Option<f32>,
     /// Look up every texture in the file's own texels; without it, those of colours and roughness in mip chains, by ray
     /// cones that are a quarter of a pixel wide and widen at each scattering event.
     #[arg(long, help_heading = "Light transport")]
@@ -89,6 +93,9 @@ impl EstimatorArgs {
         let mut add = |name: &str, value: String| flags.push(format!("--{name}={value}"));
         if let Some(bounces) = self.max_bounces {
             add("max-bounces", bounces.to_string());
+        }
+        if let Some(most) = self.clamp_indirect {
+            add("clamp-indirect", most.to_string());
         }
         let default = Settings::default();
         let named = [
@@ -143,6 +150,7 @@ impl EstimatorArgs {
         settings.mis_heuristic = self.mis;
         settings.env_sampling = self.env_sampling;
         settings.mip = !self.no_mip;
+        settings.clamp_indirect = self.clamp_indirect;
         settings.trace = self.trace;
         settings.bvh_quality = self.bvh_quality;
         settings.device = self.device;

@@ -75,6 +75,12 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|&x| x > 0.0).ok_or_else(|| "expected a number above 0".to_owned())
 }
 
+/// The same as an f32, which must not round to 0 or to infinity.
+pub(crate) fn positive_f32(text: &str) -> Result<f32, String> {
+    let x = positive(text)? as f32;
+    if x > 0.0 && x.is_finite() { Ok(x) } else { Err("expected a number above 0 that an f32 can hold".to_owned()) }
+}
+
 /// Exposure steps; ±60 is beyond every radiance that occurs and still multiplies without overflow of an f32's factor.
 pub(crate) fn exposure_ev(text: &str) -> Result<f32, String> {
     let ev = finite(text)?;

@@ -122,6 +122,7 @@ fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {
         kernel_key: Some(result.kernel_key.clone()),
         scene: Some(scene.name.clone()),
         integrator: Some(job.settings.integrator.to_string()),
+        clamp_indirect: job.settings.clamp_indirect,
         estimated_error: result.error_estimate.map(|e| e.error as f32),
         estimated_error_interval: result.error_estimate.map(|e| e.interval.map(|bound| bound as f32)),
         device: Some(format!("{}, {}", result.device, result.driver)),
@@ -190,6 +191,7 @@ mod tests {
             world_to_camera: [1.0; 16],
             world_to_ndc: [2.0; 16],
             error_estimate: None,
+            robust_mean: None,
             warnings: Vec::new(),
         }
     }

@@ -33,6 +33,8 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "light_sampling": job.settings.light_sampling.name(),
         "light_choice": result.light_choice.name(),
         "max_bounces": job.settings.max_bounces,
+        "clamp_indirect": job.settings.clamp_indirect,
+        "biased": job.settings.clamp_indirect.is_some(),
         "stopped_by": result.stopped_by.to_string(),
         "rays": result.rays,
         "paths": result.paths,
@@ -44,6 +46,8 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "estimated_error_interval": result.error_estimate.map(|e| e.interval),
         "estimated_error_confidence": result.error_estimate.map(|_| CONFIDENCE),
         "estimated_error_replicates": result.error_estimate.map(|e| e.replicates),
+        "mean_luminance": result.robust_mean.map(|m| m.mean),
+        "median_of_means_luminance": result.robust_mean.map(|m| m.median_of_means),
         "target_error": job.settings.target_error,
         "non_finite_samples": result.non_finite_samples,
         "first_non_finite": result.first_non_finite,
@@ -77,6 +81,13 @@ fn print_error(job: &RenderJob, result: &RenderResult) {
         eprint!(" ({confidence:.0} %: {low:.3} % to {high:.3} %, from {} replicates)", estimate.replicates);
     }
     eprintln!();
+    if let Some(m) = result.robust_mean.filter(|m| m.mean > 0.0) {
+        let share = 100.0 * (1.0 - m.median_of_means / m.mean);
+        eprintln!(
+            "  mean luminance {:.5}, median of means {:.5}: {share:.2} % hangs on a few bright samples",
+            m.mean, m.median_of_means
+        );
+    }
 }
 
 /// What the run did, in a few lines on standard error.

@@ -24,7 +24,7 @@ pub struct Merged {
 /// merged images rounds once more each time.
 ///
 /// # Errors
-/// [`Error::Usage`] without parts. [`Error::Input`], naming the file, if sizes, cameras or integrators differ, if a
+/// [`Error::Usage`] without parts. [`Error::Input`], naming the file, if sizes, cameras, integrators or bounds on indirect light differ, if a
 /// part says nothing about its sample counts, or if two parts hold the same samples of the same seed.
 pub fn merge(mut parts: Vec<Part>) -> Result<Merged> {
     // Sums are f64 and their order could show in the last bit: let it depend on the samples, not on the arguments.
@@ -64,6 +64,10 @@ fn check_same_view(parts: &[Part]) -> Result<()> {
         if mine.integrator != theirs.integrator {
             let name = |m: &Metadata| m.integrator.clone().unwrap_or_else(|| "(none)".to_owned());
             return Err(differs("integrator", &name(mine), &name(theirs)));
+        }
+        if mine.clamp_indirect != theirs.clamp_indirect {
+            let bound = |m: &Metadata| m.clamp_indirect.map_or_else(|| "(none)".to_owned(), |most| most.to_string());
+            return Err(differs("--clamp-indirect", &bound(mine), &bound(theirs)));
         }
         if mine.world_to_ndc != theirs.world_to_ndc || mine.world_to_camera != theirs.world_to_camera {
             return Err(differs("camera", "(worldToCamera, worldToNDC)", "that"));

@@ -33,6 +33,8 @@ pub struct Metadata {
     pub scene: Option<String>,
     /// `integrator` (string).
     pub integrator: Option<String>,
+    /// `clampIndirect` (float): the bound of an image whose indirect light was cut off; a biased one.
+    pub clamp_indirect: Option<f32>,
     /// `estimatedError` (float): relative, see [`super::replicates::ErrorEstimate`].
     pub estimated_error: Option<f32>,
     /// `estimatedErrorInterval` (v2f): its bounds.
@@ -108,6 +110,7 @@ impl Metadata {
         put("samplesPerPixel", self.samples_per_pixel.map(AttributeValue::F32));
         put("seed", self.seed.map(|s| AttributeValue::I32(s.cast_signed())));
         put("renderTime", self.render_time_seconds.map(AttributeValue::F32));
+        put("clampIndirect", self.clamp_indirect.map(AttributeValue::F32));
         put("estimatedError", self.estimated_error.map(AttributeValue::F32));
         let interval = self.estimated_error_interval.map(|[low, high]| AttributeValue::FloatVec2(Vec2(low, high)));
         put("estimatedErrorInterval", interval);
@@ -140,6 +143,7 @@ impl Metadata {
                 ("samplesPerPixel", AttributeValue::I32(v)) => metadata.samples_per_pixel = Some(*v as f32),
                 ("seed", AttributeValue::I32(v)) => metadata.seed = Some(v.cast_unsigned()),
                 ("renderTime", AttributeValue::F32(v)) => metadata.render_time_seconds = Some(*v),
+                ("clampIndirect", AttributeValue::F32(v)) => metadata.clamp_indirect = Some(*v),
                 ("estimatedError", AttributeValue::F32(v)) => metadata.estimated_error = Some(*v),
                 ("estimatedErrorInterval", AttributeValue::FloatVec2(v)) => {
                     metadata.estimated_error_interval = Some([v.0, v.1]);

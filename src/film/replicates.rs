@@ -39,6 +39,17 @@ pub struct ErrorEstimate {
     pub replicates: usize,
 }
 
+/// The mean luminance of an image, and what is left of it if each pixel is the median of its replicates' means (Nemirovsky
+/// and Yudin 1983; in rendering: Jung, Meyer and DeLong 2015): a few bright samples cannot move that, so the
+/// difference is the light that hangs on them. The median of a skewed distribution is below its mean: it is no better image.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct RobustMean {
+    /// Mean over pixels of the luminance.
+    pub mean: f64,
+    /// Mean over pixels of the median over replicates of the luminance.
+    pub median_of_means: f64,
+}
+
 /// Σ and Σ of squares over pixels of their squared relative errors.
 #[derive(Clone, Copy, Debug, Default)]
 struct Terms {
@@ -60,6 +71,27 @@ impl ReplicateSums {
         let sum = &mut self.pixels[pixel][block as usize % REPLICATES];
         sum.luminance += luminance(sum_rgb);
         sum.count += count;
+    }
+
+    /// The image's mean luminance, plain and by medians. `None` where a pixel has samples in fewer than three replicates
+    /// (of two, the median is the mean) or a sum is not finite.
+    pub fn robust_mean(&self) -> Option<RobustMean> {
+        let (mut mean, mut median) = (0.0, 0.0);
+        for sums in &self.pixels {
+            let mut means = Vec::with_capacity(REPLICATES);
+            means.extend(sums.iter().filter(|s| s.count > 0).map(|s| s.luminance / f64::from(s.count)));
+            if means.len() < 3 {
+                return None;
+            }
+            means.sort_by(f64::total_cmp);
+            median += 0.5 * (means[(means.len() - 1) / 2] + means[means.len() / 2]);
+            let (luminance, count) =
+                sums.iter().fold((0.0, 0.0), |(l, n), s| (l + s.luminance, n + f64::from(s.count)));
+            mean += luminance / count;
+        }
+        let pixels = self.pixels.len() as f64;
+        let robust = RobustMean { mean: mean / pixels, median_of_means: median / pixels };
+        (robust.mean.is_finite() && robust.median_of_means.is_finite()).then_some(robust)
     }
 
     /// The error of the mean image. `None` where a pixel has samples in fewer than two replicates or a sum is not
@@ -198,6 +230,22 @@ mod tests {
         let estimate = sums.estimate().unwrap();
         assert!((estimate.error.powi(4) - by_own * by_others).abs() < 1e-12, "{estimate:?}");
         assert_eq!(estimate.replicates, 2);
+    }
+
+    #[test]
+    fn a_lone_firefly_does_not_move_the_median_of_means() {
+        let mut sums = ReplicateSums::new(2);
+        for block in 0..8 {
+            sums.add_block(0, block, [if block == 3 { 1600.0 } else { 1.6 }; 3], 16);
+            // Means 1 to 8: the median is between 4 and 5.
+            sums.add_block(1, block, [16.0 * f64::from(block + 1); 3], 16);
+        }
+        let robust = sums.robust_mean().unwrap();
+        assert!((robust.mean - 0.5 * ((7.0 * 0.1 + 100.0) / 8.0 + 4.5)).abs() < 1e-9, "{robust:?}");
+        assert!((robust.median_of_means - 0.5 * (0.1 + 4.5)).abs() < 1e-9, "{robust:?}");
+        let mut two = ReplicateSums::new(1);
+        (0..2).for_each(|block| two.add_block(0, block, [1.0; 3], 16));
+        assert_eq!(two.robust_mean(), None);
     }
 
     #[test]

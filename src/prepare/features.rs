@@ -33,6 +33,8 @@ pub struct Features {
     pub emission: bool,
     /// Any metallic-roughness surface that transmits.
     pub transmission: bool,
+    /// Any clear thin wall: light samples pass it.
+    pub panes: bool,
     /// Any surface that encloses a volume.
     pub volume: bool,
     /// Any dielectric whose specular reflection is not the plain one of its index of refraction.
@@ -73,6 +75,7 @@ impl Features {
             ("schlick", self.schlick),
             ("metallic-roughness", bsdf(BSDF_METALLIC_ROUGHNESS)),
             ("transmission", self.transmission),
+            ("panes", self.panes),
             ("volume", self.volume),
             ("specular", self.specular),
             ("anisotropy", self.anisotropy),

@@ -12,6 +12,10 @@ use crate::layout::{
 };
 use crate::scene::{self, Bsdf, Fresnel, Scene, TextureBinding, Volume};
 
+/// Below this α a lobe is a delta, as in shaders/include/ggx.glsl. Were it less here, light samples would only fail to pass some
+/// walls that they could.
+const SMALLEST_ALPHA: f32 = 1.0 / 4096.0;
+
 /// The material table, with what later stages ask of a material.
 #[derive(Debug, Default)]
 pub(super) struct MaterialTable {
@@ -118,6 +122,7 @@ impl MaterialTable {
             let solid = record.kind_flags & MATERIAL_VOLUME != 0;
             features.volume |= solid;
             features.transmission |= record.transmission > 0.0 && !solid;
+            features.panes |= record.transmission > 0.0 && !solid && record.roughness.powi(2) < SMALLEST_ALPHA;
             features.specular |= has_specular(record);
             features.anisotropy |= record.anisotropy > 0.0;
             features.alpha |= record.kind_flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0;

@@ -29,6 +29,8 @@ pub struct KernelKey {
     pub orthographic: bool,
     /// What is added up.
     pub integrator: Integrator,
+    /// Bright indirect light is cut off.
+    pub clamp_indirect: bool,
     /// How light is looked for.
     pub light_sampling: LightSampling,
     /// How two samples are weighed.
@@ -60,6 +62,7 @@ impl KernelKey {
             lens: camera.lens_radius > 0.0,
             orthographic: matches!(camera.projection, Projection::Orthographic { .. }),
             integrator: settings.integrator,
+            clamp_indirect: settings.clamp_indirect.is_some(),
             light_sampling: settings.light_sampling,
             mis_heuristic: settings.mis_heuristic,
             sampler: settings.sampler,
@@ -89,6 +92,8 @@ impl KernelKey {
             f.volume,
             f.mip,
             f.near_lamps,
+            self.clamp_indirect,
+            f.panes,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {
@@ -125,6 +130,9 @@ impl fmt::Display for KernelKey {
         write!(f, " [{}]", self.features.kept().join(" "))?;
         if self.sampler != SamplerKind::Independent {
             write!(f, " {}{}", self.sampler, if self.replicates { ":replicates" } else { "" })?;
+        }
+        if self.clamp_indirect {
+            f.write_str(" clamp-indirect")?;
         }
         if self.lens {
             f.write_str(" lens")?;

@@ -100,6 +100,9 @@ pub fn render_on(
         warnings
             .push(format!("{} samples had a path cut off at 65535 bounces: the image is too dark", run.capped_samples));
     }
+    if let Some(most) = settings.clamp_indirect {
+        warnings.push(format!("biased: indirect light above {most} is cut off, the image is too dark where it was"));
+    }
     let error_estimate = run.replicates.as_ref().and_then(ReplicateSums::estimate);
     if run.replicates.is_some() && error_estimate.is_none() {
         warnings.push(String::from(
@@ -142,6 +145,7 @@ pub fn render_on(
             Projection::Orthographic { ymag } => world_to_ndc_orthographic(camera.camera_to_world, ymag, aspect),
         },
         error_estimate,
+        robust_mean: run.replicates.as_ref().and_then(ReplicateSums::robust_mean),
         warnings,
     })
 }

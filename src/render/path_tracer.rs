@@ -76,6 +76,7 @@ impl PathTracer {
         let mut constants = prepared.constants;
         camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
         constants.max_bounces = effective_max_bounces(settings);
+        constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
         let constants_buffer = Buffer::new(
             gpu,
             "render constants",

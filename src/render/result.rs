@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::film::Film;
-use crate::film::replicates::ErrorEstimate;
+use crate::film::replicates::{ErrorEstimate, RobustMean};
 use crate::prepare::LightChoice;
 
 /// The outcome of a render.
@@ -45,6 +45,8 @@ pub struct RenderResult {
     pub world_to_ndc: [f32; 16],
     /// The error with an interval, where the settings ask for it and enough samples were drawn.
     pub error_estimate: Option<ErrorEstimate>,
+    /// The image's mean beside its median of means, where replicates were kept.
+    pub robust_mean: Option<RobustMean>,
     /// What the user should know, one line each.
     pub warnings: Vec<String>,
 }

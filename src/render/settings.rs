@@ -41,6 +41,9 @@ pub struct Settings {
     pub light_sampling: LightSampling,
     /// How a light is picked at a vertex; a scene of few lights is not given a tree.
     pub light_choice: LightChoice,
+    /// Most that a path may bring at once after two scattering events or more (largest component), > 0. It takes light
+    /// away from the image: a bias.
+    pub clamp_indirect: Option<f32>,
     /// How [`LightSampling::Mis`] weighs its two samples.
     pub mis_heuristic: MisHeuristic,
     /// How directions to an image environment are chosen.
@@ -79,6 +82,7 @@ impl Default for Settings {
             sampler: SamplerKind::default(),
             light_sampling: LightSampling::default(),
             light_choice: LightChoice::default(),
+            clamp_indirect: None,
             mis_heuristic: MisHeuristic::default(),
             env_sampling: EnvironmentSampling::default(),
             filter: PixelFilter::default(),

@@ -102,6 +102,14 @@ mutations! {
     roulette_without_compensation: "path_trace.comp",
         "lane.throughput /= survival;" => "",
         caught by "furnace::closed_box_of_albedo_one_half_has_radiance_two";
+    /// Light behind a pane is found by light samples, and again in full by chance.
+    light_behind_panes_twice: "path_trace.comp",
+        "if (HAS_PANES && (scattered.flags & STRAIGHT) == STRAIGHT && bsdf_is_pane(surface.bsdf)) {" => "if (false) {",
+        caught by "panes::ways_to_look_for_light_agree_behind_panes";
+    /// Panes take nothing of the light that light samples bring.
+    panes_without_absorption: "path_trace.comp",
+        "lane.shadow_light *= pane_transmittance(surface.bsdf);" => "",
+        caught by "panes::a_point_light_shines_through_panes";
     /// The shadow ray passes a sheet wherever the path's ray did.
     shared_alpha_decisions: "include/alpha.glsl",
         "shadow ? bits.zw : bits.xy" => "bits.xy",

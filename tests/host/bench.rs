@@ -23,7 +23,7 @@ fn image(random: &mut Random, side: u32, spp: u32, mean: impl Fn(u32, u32) -> f6
 fn mean_image(random: &mut Random, side: u32, images: u32, spp: u32, mean: impl Fn(u32, u32) -> f64) -> MeanImage {
     let mut accumulator = ImageAccumulator::new((side, side));
     for _ in 0..images {
-        accumulator.add(&image(random, side, spp, &mean));
+        accumulator.add(&image(random, side, spp, &mean), f64::from(spp));
     }
     accumulator.finish()
 }
@@ -89,6 +89,33 @@ fn a_bias_in_one_tile_is_found_there() {
     assert!(!same.biased && same.tests == 3 * 10, "{same:?}");
 }
 
+/// One sample of 20,000 carries a sixth of the light: four runs in five of this length meet none.
+#[test]
+fn light_that_a_short_run_has_not_met_is_no_bias() {
+    let mut random = Random(6);
+    let mut runs = |images: u32, spp: u32| {
+        let mut accumulator = ImageAccumulator::new((8, 8));
+        for _ in 0..images {
+            let pixel = |random: &mut Random| {
+                let sum: f64 = (0..spp).map(|_| if random.unit() < 5e-5 { 1000.0 } else { 0.5 * random.unit() }).sum();
+                [(sum / f64::from(spp)) as f32; 3]
+            };
+            let radiance: Vec<_> = (0..64).map(|_| pixel(&mut random)).collect();
+            accumulator.add(&radiance, f64::from(spp));
+        }
+        accumulator.finish()
+    };
+    let reference = runs(8, 4096);
+    let (mut found, mut without) = (0, 0);
+    for _ in 0..50 {
+        let image = runs(4, 16);
+        found += u32::from(find_bias(&image, &reference).biased);
+        without += u32::from(find_bias(&MeanImage { spp: None, ..image }, &reference).biased);
+    }
+    assert!(found <= 3, "{found} of 50 at the level 0.01");
+    assert!(without >= 25, "the case is one that the plain test gets wrong: {without} of 50");
+}
+
 #[test]
 fn what_would_have_been_seen_is_seen() {
     let mut random = Random(5);
@@ -107,8 +134,8 @@ fn what_would_have_been_seen_is_seen() {
 fn equal_constants_are_no_bias_and_different_ones_are() {
     let constant = |value: f32| {
         let mut image = ImageAccumulator::new((8, 8));
-        image.add(&[[value; 3]; 64]);
-        image.add(&[[value; 3]; 64]);
+        image.add(&[[value; 3]; 64], 1.0);
+        image.add(&[[value; 3]; 64], 1.0);
         image.finish()
     };
     assert!(!find_bias(&constant(0.3), &constant(0.3)).biased);

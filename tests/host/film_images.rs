@@ -39,6 +39,7 @@ fn metadata() -> Metadata {
         kernel_key: Some("bvh/w4/µ".to_owned()),
         scene: Some("cornell".to_owned()),
         integrator: Some("path".to_owned()),
+        clamp_indirect: Some(10.0),
         estimated_error: Some(0.25),
         estimated_error_interval: Some([0.125, 0.5]),
         device: Some("llvmpipe, 25.0".to_owned()),

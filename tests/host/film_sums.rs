@@ -86,10 +86,14 @@ fn merged_ranges_are_joined() {
 }
 
 #[test]
-fn merge_refuses_other_sizes_and_integrators() {
+fn merge_refuses_other_sizes_integrators_and_bounds() {
     let mut other = part(&[[1.0; 3]], 8);
     other.1.metadata.integrator = Some("direct".to_owned());
     assert!(merge(vec![part(&[[1.0; 3]], 0), other]).unwrap_err().to_string().contains("integrator"));
+    let mut cut = part(&[[1.0; 3]], 8);
+    cut.1.metadata.clamp_indirect = Some(2.0);
+    let message = merge(vec![part(&[[1.0; 3]], 0), cut]).unwrap_err().to_string();
+    assert!(message.contains("--clamp-indirect 2"), "{message}");
     let wide = ExrImage::from_film(&Film::new(2, 1), Metadata::default());
     let message = merge(vec![part(&[[1.0; 3]], 0), ("wide.exr".into(), wide)]).unwrap_err().to_string();
     assert!(message.contains("1x1") && message.contains("2x1"), "{message}");
