@@ -219,7 +219,8 @@ bool finish_shadow(inout LaneState lane, bool free) {
 // Whether the shadow ray has met something that may be a pane; then the nearest surface is looked for from here on.
 bool may_be_pane(Hit hit) {
     if (hit.triangle.slot == NONE) return false;
-    Material material = load_material(constants, load_triangle(hit.triangle.slot).material);
+    uint kind = load_triangle_kind(constants, hit.triangle.slot);
+    Material material = load_material(constants, triangle_look(constants, kind, hit.triangle.instance).material);
     return material.transmission > 0.0 && (material.kind_flags & MATERIAL_VOLUME) == 0u;
 }
 

@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn the_version_is_found_among_other_text() {
-        let library = b"\x7fELF Mesa Project\0Mesa \0Mesa X11\025.0.7-2~bpo12+1Mesa 25.0.7-2~bpo12+1 (LLVM 15.0";
+        let library = b"\x7fELF Mesa Project\0Mesa \0Mesa X11\x0025.0.7-2~bpo12+1Mesa 25.0.7-2~bpo12+1 (LLVM 15.0";
         assert_eq!(version_in(library), Some(MesaVersion { major: 25, minor: 0 }));
         assert_eq!(version_in(b"Mesa 22.3.6 (LLV6 (LLVM 15.0.6)"), Some(MesaVersion { major: 22, minor: 3 }));
         for unknown in [&b""[..], b"Mesa ", b"Mesa 25", b"Mesa 25.", b"a driver"] {
@@ -134,7 +134,7 @@ mod tests {
         fs::write(&beside, b"Mesa 24.1.0").unwrap();
         assert!(is_lavapipe(&beside) && !is_lavapipe(Path::new("/usr/lib/libvulkan_intel.so")));
         assert_eq!(version_of(&beside), Some(MesaVersion { major: 24, minor: 1 }));
-        assert_eq!(files_of(folder.path()), [manifest.clone()]);
+        assert_eq!(files_of(folder.path()), std::slice::from_ref(&manifest));
         fs::write(&manifest, "not JSON").unwrap();
         assert_eq!(library(&manifest), None);
     }

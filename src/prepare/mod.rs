@@ -278,7 +278,7 @@ impl Prepared {
         };
         let index = record.kind & TRIANGLE_INDEX_MASK;
         let light = if record.kind & TRIANGLE_LIGHT != 0 { Some(index) } else { None };
-        PreparedTriangle { vertices: if number % 2 == 0 { [a, b, c] } else { [a, c, d] }, record, light }
+        PreparedTriangle { vertices: if number.is_multiple_of(2) { [a, b, c] } else { [a, c, d] }, record, light }
     }
 }
 
