@@ -286,6 +286,38 @@ bool advance_path(inout LaneState lane, Hit hit) {
     return finish_shadow(lane, free);
 }
 
+void next_sample(inout LaneState lane) {
+    finish_sample(lane);
+    if (lane.sample_index < lane.end_sample) start_sample(lane);
+}
+
+void render(inout LaneState lane, uint ray_limit) {
+    Trace trace;
+    trace_begin(trace, constants, lane.ray, alpha_key(lane));
+    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
+        trace_advance(trace, constants);
+        if (!trace_done(trace)) continue;
+        if (!advance_path(lane, trace_hit(trace))) next_sample(lane);
+        trace_begin(trace, constants, lane.ray, alpha_key(lane));
+    }
+}
+
+#if TRACE_BACKEND == TRACE_BVH
+// A search ends at once, so that all lanes shade together; the shadow ray is traced by a search of its own, which only asks
+// whether there is anything.
+void render_baked(inout LaneState lane, uint ray_limit) {
+    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
+        lane.rays += 1u;
+        bool goes_on = shade(lane, trace_nearest(lane.ray));
+        if (goes_on && lane.ray.any_hit) {
+            lane.rays += 1u;
+            goes_on = finish_shadow(lane, !trace_occluded(lane.ray));
+        }
+        if (!goes_on) next_sample(lane);
+    }
+}
+#endif
+
 void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= slice.lanes) return;
@@ -298,17 +330,11 @@ void main() {
         if (lane.sample_index < lane.end_sample) start_sample(lane);
     }
     uint ray_limit = lane.rays + slice.ray_budget;
-    Trace trace;
-    trace_begin(trace, constants, lane.ray, alpha_key(lane));
-    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
-        trace_advance(trace, constants);
-        if (!trace_done(trace)) continue;
-        if (!advance_path(lane, trace_hit(trace))) {
-            finish_sample(lane);
-            if (lane.sample_index < lane.end_sample) start_sample(lane);
-        }
-        trace_begin(trace, constants, lane.ray, alpha_key(lane));
-    }
+#if TRACE_BACKEND == TRACE_BVH
+    if (BAKED) render_baked(lane, ray_limit);
+    else
+#endif
+    render(lane, ray_limit);
     bool complete = lane.sample_index >= lane.end_sample;
     results[index] = block_result(lane, complete);
     lanes[index] = lane;

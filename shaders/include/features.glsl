@@ -13,6 +13,7 @@ layout(constant_id = 8) const uint ENVIRONMENT_SAMPLING = 0u;
 layout(constant_id = 9) const uint STACK_SIZE = 64u;
 layout(constant_id = 10) const uint SAMPLER = 0u;
 layout(constant_id = 11) const uint LIGHT_CHOICE = 1u;
+layout(constant_id = 12) const bool BAKED = false;
 
 const bool HAS_TEXTURES = (FEATURES & 1u) != 0u;
 const bool HAS_INSTANCES = (FEATURES & 2u) != 0u;

@@ -6,6 +6,8 @@
 #include "alpha.glsl"
 #include "features.glsl"
 #include "records.glsl"
+#include "trace_baked.glsl"
+#include "watertight.glsl"
 
 const uint LIST_BITS = 7u;
 const uint LIST_MASK = (1u << LIST_BITS) - 1u;
@@ -85,6 +87,11 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alph
     trace.world_origin = ray.origin;
     trace.world_direction = ray.direction;
     trace.alpha_key = alpha_key;
+    if (BAKED) {
+        // Done at once.
+        trace.current = NONE;
+        if (!ray.any_hit || trace_occluded(ray)) trace.hit = trace_nearest(ray);
+    }
 }
 
 bool trace_done(Trace trace) { return trace.current == NONE; }
@@ -155,46 +162,19 @@ void visit_inner(Trace trace, uvec4 q0, uvec4 q1, uvec4 q2, out uint next, out u
     next = key_0 != MISSED ? (q2.z << 2u | uint(key_0 & 3)) : NONE;
 }
 
-// The axis of the largest component, and v rotated so that it is the last.
-vec3 rotate_axis(vec3 v, bool x_largest, bool y_largest) { return x_largest ? v.yzx : (y_largest ? v.zxy : v); }
-
-// Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": vertices are sheared into ray space, each by the
-// same operations wherever it is shared, and edges are tested there by differences of products. Rounding is monotonic, so
-// a computed edge function never has the wrong sign, it can only be zero; zero counts as inside. Hence a closed mesh has
-// no gap. `precise` keeps the compiler from fusing, which would break the symmetry between neighbours.
 void visit_leaf(inout Trace trace, RenderConstants constants, uvec4 q0, uvec4 q1, uvec4 q2) {
-    vec3 magnitude = abs(trace.direction);
-    bool x_largest = magnitude.x > magnitude.y && magnitude.x > magnitude.z;
-    bool y_largest = !x_largest && magnitude.y > magnitude.z;
-    vec3 d = rotate_axis(trace.direction, x_largest, y_largest);
-    precise float shear_z = 1.0 / d.z;
-    precise float shear_x = d.x * shear_z;
-    precise float shear_y = d.y * shear_z;
-    precise vec3 a = rotate_axis(uintBitsToFloat(q0.xyz) - trace.origin, x_largest, y_largest);
-    precise vec3 b = rotate_axis(uintBitsToFloat(uvec3(q0.w, q1.xy)) - trace.origin, x_largest, y_largest);
-    precise vec3 c = rotate_axis(uintBitsToFloat(uvec3(q1.zw, q2.x)) - trace.origin, x_largest, y_largest);
-    precise float ax = a.x - shear_x * a.z;
-    precise float ay = a.y - shear_y * a.z;
-    precise float bx = b.x - shear_x * b.z;
-    precise float by = b.y - shear_y * b.z;
-    precise float cx = c.x - shear_x * c.z;
-    precise float cy = c.y - shear_y * c.z;
-    precise float u = cx * by - cy * bx;
-    precise float v = ax * cy - ay * cx;
-    precise float w = bx * ay - by * ax;
-    precise float determinant = u + v + w;
-    precise float scaled_t = (u * a.z + v * b.z + w * c.z) * shear_z;
-    bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-    float t = scaled_t / determinant;
+    TriangleMeeting meeting =
+        meet_triangle(ray_space(trace.direction), trace.origin, uintBitsToFloat(q0.xyz),
+                      uintBitsToFloat(uvec3(q0.w, q1.xy)), uintBitsToFloat(uvec3(q1.zw, q2.x)));
     TriangleId triangle = TriangleId(trace.current, trace.instance);
     bool excluded = same_triangle(triangle, trace.from) || same_triangle(triangle, trace.towards);
     // A zero determinant gives an infinite or undefined t, which fails here.
-    if (inside && determinant != 0.0 && t > 0.0 && t < trace.hit.t && !excluded) {
-        vec2 barycentric = vec2(v, w) / determinant;
+    if (meeting.inside && meeting.determinant != 0.0 && meeting.t > 0.0 && meeting.t < trace.hit.t && !excluded) {
+        vec2 barycentric = meeting.scaled / meeting.determinant;
         if (HAS_ALPHA && (q2.w & SLOT_ALPHA) != 0u &&
             !alpha_hits(constants, trace.alpha_key, q2.w & SLOT_MATERIAL_MASK, q2.y, trace.instance, barycentric))
             return;
-        trace.hit = Hit(triangle, t, barycentric);
+        trace.hit = Hit(triangle, meeting.t, barycentric);
     }
 }
 

@@ -39,6 +39,8 @@ pub struct KernelKey {
     pub sampler: SamplerKind,
     /// Its points are those of independent replicates, by which the error is estimated.
     pub replicates: bool,
+    /// Hash of the triangles that are compiled in.
+    pub baked: Option<u64>,
     /// How environment directions are drawn.
     pub env_sampling: EnvironmentSampling,
 }
@@ -67,6 +69,7 @@ impl KernelKey {
             mis_heuristic: settings.mis_heuristic,
             sampler: settings.sampler,
             replicates: settings.sampler == SamplerKind::Sobol && settings.estimates_error(),
+            baked: None,
             env_sampling: settings.env_sampling,
         }
     }
@@ -114,6 +117,7 @@ impl KernelKey {
             (9, self.stack_size),
             (10, self.sampler as u32 + u32::from(self.replicates)),
             (11, u32::from(f.light_choice == LightChoice::Bvh)),
+            (12, u32::from(self.baked.is_some())),
         ]
     }
 }
@@ -136,6 +140,9 @@ impl fmt::Display for KernelKey {
         }
         if self.lens {
             f.write_str(" lens")?;
+        }
+        if let Some(hash) = self.baked {
+            write!(f, " baked:{hash:016x}")?;
         }
         if self.orthographic {
             f.write_str(" orthographic")?;

@@ -1,5 +1,6 @@
 //! Rendering: what is asked for ([`Settings`]), how it goes on ([`ProgressUpdate`]) and what comes out ([`RenderResult`]).
 
+mod bake;
 mod function_kernel;
 mod kernel_key;
 mod looks;
@@ -16,6 +17,7 @@ mod slices;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+pub use bake::{Bake, MOST_BAKED_TRIANGLES, triangles as baked_triangles};
 pub use function_kernel::FunctionCall;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use ash::vk::BufferUsageFlags as Usage;
 
+use super::bake::Bake;
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
@@ -89,8 +90,10 @@ impl PathTracer {
         let mut slices = slices?;
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let key = KernelKey::new(prepared, camera, settings, trace, form);
-        let kernel = build_kernel(gpu, &key, settings, overrides, &buffers, &constants_buffer, &slices)?;
+        let bake = Bake::choose(prepared, &gpu.info, trace, settings.bake && !overrides.driver_specializes);
+        let mut key = KernelKey::new(prepared, camera, settings, trace, form);
+        key.baked = bake.key();
+        let kernel = build_kernel(gpu, &key, &bake, settings, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
@@ -238,6 +241,7 @@ fn effective_max_bounces(settings: &Settings) -> u32 {
 fn build_kernel(
     gpu: &Arc<Gpu>,
     key: &KernelKey,
+    bake: &Bake,
     settings: &Settings,
     overrides: BindingOverride,
     buffers: &SceneBuffers,
@@ -270,6 +274,7 @@ fn build_kernel(
             workgroup_size,
             constants: &key.specialization(),
             driver_specializes: overrides.driver_specializes,
+            baked: &bake.triangles,
             push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
             sets: &sets,
         },

@@ -52,6 +52,8 @@ pub struct Settings {
     pub filter: PixelFilter,
     /// Look textures up in mip chains by ray cones, not in the files' texels alone.
     pub mip: bool,
+    /// Compile small scenes into the kernel on software devices.
+    pub bake: bool,
     /// Which implementation traces rays.
     pub trace: TraceChoice,
     /// Which device renders.
@@ -85,6 +87,7 @@ impl Default for Settings {
             env_sampling: EnvironmentSampling::default(),
             filter: PixelFilter::default(),
             mip: true,
+            bake: true,
             trace: TraceChoice::default(),
             device: DeviceChoice::default(),
             shaders_dir: None,

@@ -86,7 +86,7 @@ mutations! {
         "scaled > 0.0 ? sqrt(scaled) / eta : -1.0" => "sqrt(scaled) / eta",
         caught by "bsdf_delta::refract_reflects_totally_or_not_at_all";
     /// A ray through an edge belongs to neither triangle.
-    leaky_edges: "include/trace_bvh.glsl",
+    leaky_edges: "include/watertight.glsl",
         "(u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)" =>
         "(u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)",
         caught by "watertight::axis_parallel_rays_do_not_leak";

@@ -1,0 +1,194 @@
+//! Geometry as code: the bodies of `baked_nearest` and `baked_occluded` (shaders/include/trace_baked.glsl) are replaced by
+//! straight code over the faces of a small scene, with its vertices as literals.
+//!
+//! What faces share is computed once: the projection of a vertex, the edge function of an edge (the neighbour takes it with
+//! the other sign, which is exact), the distance along an axis.
+
+use super::code::Code;
+use super::faces::{BakedTriangle, Face, faces};
+use super::instruction::op;
+use super::module::Module;
+
+/// Words of a set of excluded slots: one for 32 slots.
+const SET_BITS: u32 = 32;
+
+/// `spirv` with the triangles in the places of the two functions.
+///
+/// `None` if the module lacks them or what they need, or cannot be taken apart.
+pub fn bake(spirv: &[u32], triangles: &[BakedTriangle]) -> Option<Vec<u32>> {
+    let module = Module::read(spirv)?;
+    let faces = faces(triangles);
+    let mut code = Code::new(&module)?;
+    let mut bodies = Vec::new();
+    for (name, search) in [("baked_nearest(", Search::Nearest), ("baked_occluded(", Search::Occluded)] {
+        let function = code.find_function(name)?;
+        let parameters = code.begin(function);
+        let ray = RayIds::new(&mut code, &parameters, &faces)?;
+        let result = emit_search(&mut code, &ray, &faces, search);
+        bodies.push((function, code.end(result)));
+    }
+    Some(code.splice(&bodies))
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Search {
+    Nearest,
+    Occluded,
+}
+
+/// The ids of a ray's numbers.
+struct RayIds {
+    origin: [u32; 3],
+    direction: [u32; 3],
+    row_x: [u32; 3],
+    row_y: [u32; 3],
+    t_max: u32,
+    /// The set of excluded slots, a word for 32 of them; `None` where the scene has none of these.
+    excluded: Vec<Option<u32>>,
+}
+
+impl RayIds {
+    fn new(code: &mut Code<'_>, parameters: &[u32], faces: &[Face]) -> Option<Self> {
+        let &[origin, direction, row_x, row_y, t_max, from, towards] = parameters else { return None };
+        let [origin, direction, row_x, row_y] = [origin, direction, row_x, row_y].map(|v| code.components(v));
+        let slots = || faces.iter().flat_map(|face| &face.triangles).map(|t| t.slot);
+        let words = slots().max().map_or(0, |slot| slot / SET_BITS + 1);
+        let excluded = (0..words)
+            .map(|word| {
+                slots().any(|slot| slot / SET_BITS == word).then(|| {
+                    let [a, b] = [from, towards].map(|slot| code.set_word(slot, word));
+                    code.uint(op::BITWISE_OR, &[a, b])
+                })
+            })
+            .collect();
+        Some(Self { origin, direction, row_x, row_y, t_max, excluded })
+    }
+
+    /// A vertex relative to the origin.
+    fn relative(&self, code: &mut Code<'_>, vertex: [f32; 3]) -> [u32; 3] {
+        [0, 1, 2].map(|i| {
+            let coordinate = code.constant_float(vertex[i]);
+            code.float(op::F_SUB, &[coordinate, self.origin[i]])
+        })
+    }
+
+    /// A vertex in ray space.
+    fn project(&self, code: &mut Code<'_>, vertex: [f32; 3]) -> [u32; 2] {
+        let relative = self.relative(code, vertex);
+        [self.row_x, self.row_y].map(|row| {
+            let products = [0, 1, 2].map(|i| code.float(op::F_MUL, &[row[i], relative[i]]));
+            let sum = code.float(op::F_ADD, &[products[0], products[1]]);
+            code.float(op::F_ADD, &[sum, products[2]])
+        })
+    }
+
+    /// The signs of an edge function: words whose top bits say that it is negative, and positive. Of the two directions of
+    /// an edge the one is computed whose first vertex is the lesser.
+    fn edge_signs(&self, code: &mut Code<'_>, first: [f32; 3], second: [f32; 3]) -> [u32; 2] {
+        let bits = |v: [f32; 3]| v.map(f32::to_bits);
+        if bits(first) > bits(second) {
+            let [negative, positive] = self.edge_signs(code, second, first);
+            return [positive, negative];
+        }
+        let [ax, ay] = self.project(code, first);
+        let [bx, by] = self.project(code, second);
+        let left = code.float(op::F_MUL, &[ax, by]);
+        let right = code.float(op::F_MUL, &[ay, bx]);
+        // Each difference is 0 or has the sign of the exact one; x - x is +0, but a product of -0 could make it -0.
+        let difference = code.float(op::F_SUB, &[left, right]);
+        let zero = code.constant_float(0.0);
+        let negative = code.float(op::F_ADD, &[difference, zero]);
+        let positive = code.float(op::F_SUB, &[zero, difference]);
+        [negative, positive].map(|value| code.int(op::BITCAST, &[value]))
+    }
+
+    /// A word whose top bit says that the line of the ray meets the triangle: there are edge functions of one sign, and
+    /// none of the other. Zero has no sign, and all zero is edge-on.
+    fn meets(&self, code: &mut Code<'_>, triangle: &BakedTriangle) -> u32 {
+        let [a, b, c] = triangle.vertices;
+        let edges = [(a, b), (b, c), (c, a)].map(|(first, second)| self.edge_signs(code, first, second));
+        let [negative, positive] = [0, 1].map(|sign| {
+            let two = code.int(op::BITWISE_OR, &[edges[0][sign], edges[1][sign]]);
+            code.int(op::BITWISE_OR, &[two, edges[2][sign]])
+        });
+        code.int(op::BITWISE_XOR, &[negative, positive])
+    }
+
+    /// The dot product of a normal with a vector, without what is multiplied by 0 or 1.
+    fn along(&self, code: &mut Code<'_>, normal: [f32; 3], vector: [u32; 3]) -> u32 {
+        let mut sum = None;
+        for (n, v) in normal.into_iter().zip(vector).filter(|(n, _)| *n != 0.0) {
+            let n_id = code.constant_float(n);
+            let product = if n == 1.0 { v } else { code.float(op::F_MUL, &[n_id, v]) };
+            sum = Some(sum.map_or(product, |sum| code.float(op::F_ADD, &[sum, product])));
+        }
+        sum.unwrap_or_else(|| code.constant_float(0.0))
+    }
+
+    /// The distance to the plane of a face. In units of rounding, it is as good as the one that a test of the triangle
+    /// interpolates: both take differences of vertices and origin.
+    fn distance(&self, code: &mut Code<'_>, face: &Face) -> u32 {
+        let relative = self.relative(code, face.triangles[0].vertices[0]);
+        let height = self.along(code, face.normal, relative);
+        let speed = self.along(code, face.normal, self.direction);
+        let one = code.constant_float(1.0);
+        let inverse = code.float(op::F_DIV, &[one, speed]);
+        code.float(op::F_MUL, &[height, inverse])
+    }
+
+    /// Whether none of the triangles of a face is excluded. All of one plane are: a ray from one cannot meet the other.
+    fn is_allowed(&self, code: &mut Code<'_>, face: &Face) -> u32 {
+        let mut allowed = None;
+        for (word, &set) in self.excluded.iter().enumerate() {
+            let in_word = |t: &&BakedTriangle| (t.slot / SET_BITS) as usize == word;
+            let bits = face.triangles.iter().filter(in_word).fold(0, |bits, t| bits | 1 << (t.slot % SET_BITS));
+            if let (Some(set), true) = (set, bits != 0) {
+                let [mask, zero] = [bits, 0].map(|bits| code.constant_uint(bits));
+                let common = code.uint(op::BITWISE_AND, &[set, mask]);
+                let none = code.bool(op::I_EQUAL, &[common, zero]);
+                allowed = Some(allowed.map_or(none, |other| code.bool(op::LOGICAL_AND, &[other, none])));
+            }
+        }
+        // Every slot is in some word.
+        allowed.unwrap_or(0)
+    }
+}
+
+/// Emits the search; returns its result.
+fn emit_search(code: &mut Code<'_>, ray: &RayIds, faces: &[Face], search: Search) -> u32 {
+    let none = code.constant_uint(u32::MAX);
+    let [zero_float, zero_int] = [code.constant_float(0.0), code.constant_int(0)];
+    let (mut nearest, mut slot, mut occluded) = (ray.t_max, none, None);
+    for face in faces {
+        let meets: Vec<u32> = face.triangles.iter().map(|triangle| ray.meets(code, triangle)).collect();
+        let word = meets[1..].iter().fold(meets[0], |word, &other| code.int(op::BITWISE_OR, &[word, other]));
+        let distance = ray.distance(code, face);
+        let conditions = [
+            code.bool(op::S_LESS_THAN, &[word, zero_int]),
+            code.bool(op::F_ORD_GREATER_THAN, &[distance, zero_float]),
+            code.bool(op::F_ORD_LESS_THAN, &[distance, nearest]),
+            ray.is_allowed(code, face),
+        ];
+        let hit = conditions[1..].iter().fold(conditions[0], |all, &one| code.bool(op::LOGICAL_AND, &[all, one]));
+        if search == Search::Occluded {
+            occluded = Some(occluded.map_or(hit, |before| code.bool(op::LOGICAL_OR, &[before, hit])));
+            continue;
+        }
+        let mut which = code.constant_uint(face.triangles[0].slot);
+        if let [_, second] = face.triangles[..] {
+            let other = code.constant_uint(second.slot);
+            let first = code.bool(op::S_LESS_THAN, &[meets[0], zero_int]);
+            which = code.uint(op::SELECT, &[first, which, other]);
+        }
+        nearest = code.float(op::SELECT, &[hit, distance, nearest]);
+        slot = code.uint(op::SELECT, &[hit, which, slot]);
+    }
+    match (search, occluded) {
+        (Search::Occluded, Some(occluded)) => occluded,
+        (Search::Occluded, None) => code.bool(op::F_ORD_LESS_THAN, &[zero_float, zero_float]),
+        (Search::Nearest, _) => {
+            let bits = code.uint(op::BITCAST, &[nearest]);
+            code.pair(bits, slot)
+        }
+    }
+}
