@@ -236,14 +236,15 @@ bool passes_pane(inout LaneState lane, Surface surface, Hit hit) {
     return true;
 }
 
-// A ray that looks for the nearest surface has come back: adds what it met and prepares the next ray. False if the path
+// The ray leaves the scene.
+void leave_scene(inout LaneState lane) {
+    if (HAS_VOLUME) lane.throughput *= transmittance(constants, lane.media, INFINITY);
+    add_environment(lane);
+}
+
+// A ray that looks for the nearest surface has met one: adds what it emits and prepares the next ray. False if the path
 // ends.
-bool shade(inout LaneState lane, Hit hit) {
-    if (hit.triangle.slot == NONE) {
-        if (HAS_VOLUME) lane.throughput *= transmittance(constants, lane.media, INFINITY);
-        add_environment(lane);
-        return false;
-    }
+bool shade_surface(inout LaneState lane, Hit hit) {
     vec3 view = -lane.ray.direction;
     // A shadow ray has the scattered ray's cone, and leaves it as it is.
     float width = HAS_MIP ? cone_width(lane.cone, hit.t) : 0.0;
@@ -269,6 +270,12 @@ bool shade(inout LaneState lane, Hit hit) {
     if (shadow) return true;
     if (goes_on) follow_scattered(lane);
     return goes_on;
+}
+
+bool shade(inout LaneState lane, Hit hit) {
+    if (hit.triangle.slot != NONE) return shade_surface(lane, hit);
+    leave_scene(lane);
+    return false;
 }
 
 // The lane's ray has been traced. False if the sample is finished.
@@ -308,10 +315,14 @@ void render(inout LaneState lane, uint ray_limit) {
 void render_baked(inout LaneState lane, uint ray_limit) {
     while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
         lane.rays += 1u;
-        bool goes_on = shade(lane, trace_nearest(lane.ray));
+        Found found = find_nearest(constants, lane.ray);
+        bool goes_on = false;
+        // Behind the one test, the triangle is loaded once for the hit and for shading.
+        if (found.slot != NONE) goes_on = shade_surface(lane, found_hit(lane.ray, found));
+        else leave_scene(lane);
         if (goes_on && lane.ray.any_hit) {
             lane.rays += 1u;
-            goes_on = finish_shadow(lane, !trace_occluded(lane.ray));
+            goes_on = finish_shadow(lane, !trace_occluded(constants, lane.ray));
         }
         if (!goes_on) next_sample(lane);
     }
@@ -331,7 +342,7 @@ void main() {
     }
     uint ray_limit = lane.rays + slice.ray_budget;
 #if TRACE_BACKEND == TRACE_BVH
-    if (BAKED) render_baked(lane, ray_limit);
+    if (BAKES_GEOMETRY) render_baked(lane, ray_limit);
     else
 #endif
     render(lane, ray_limit);

@@ -14,13 +14,20 @@ struct TriangleVertices {
     uint material;
 };
 
-TriangleVertices load_triangle(uint slot) {
-    uint base = slot * SLOT_TEXELS;
-    uvec4 q0 = LOAD4(SLOTS, base);
-    uvec4 q1 = LOAD4(SLOTS, base + 1u);
-    uvec4 q2 = LOAD4(SLOTS, base + 2u);
+TriangleVertices triangle_of(uvec4 q0, uvec4 q1, uvec4 q2) {
     return TriangleVertices(uintBitsToFloat(q0.xyz), uintBitsToFloat(uvec3(q0.w, q1.xy)),
                             uintBitsToFloat(uvec3(q1.zw, q2.x)), q2.y, q2.z, q2.w & SLOT_MATERIAL_MASK);
+}
+
+TriangleVertices load_triangle(uint slot) {
+    uint base = slot * SLOT_TEXELS;
+    return triangle_of(LOAD4(SLOTS, base), LOAD4(SLOTS, base + 1u), LOAD4(SLOTS, base + 2u));
+}
+
+// The triangle of the light with this index.
+TriangleVertices load_lamp(uint light, uint slot) {
+    if (BAKES_LIGHTS) return triangle_of(baked_lamp_0(light), baked_lamp_1(light), baked_lamp_2(light));
+    return load_triangle(slot);
 }
 
 // A point of a triangle in world space.

@@ -3,19 +3,21 @@
 #define RECORDS_GLSL
 #include "layout.glsl"
 #include "arrays.glsl"
+#include "baked_tables.glsl"
 #include "math.glsl"
 
 // Texels that no feature of the kernel looks at are not read: the optimiser drops their loads with their uses.
+#define MATERIAL_TEXEL(baked, k) (BAKES_MATERIALS ? baked(index) : LOAD4(TABLES, base + k))
 Material load_material(RenderConstants constants, uint index) {
     uint base = constants.materials + index * MATERIAL_TEXELS;
-    uvec4 a = LOAD4(TABLES, base);
-    uvec4 b = LOAD4(TABLES, base + 1u);
-    uvec4 c = LOAD4(TABLES, base + 2u);
-    uvec4 d = LOAD4(TABLES, base + 3u);
-    uvec4 e = LOAD4(TABLES, base + 4u);
-    uvec4 f = LOAD4(TABLES, base + 5u);
-    uvec4 g = LOAD4(TABLES, base + 6u);
-    uvec4 h = LOAD4(TABLES, base + 7u);
+    uvec4 a = MATERIAL_TEXEL(baked_material_0, 0u);
+    uvec4 b = MATERIAL_TEXEL(baked_material_1, 1u);
+    uvec4 c = MATERIAL_TEXEL(baked_material_2, 2u);
+    uvec4 d = MATERIAL_TEXEL(baked_material_3, 3u);
+    uvec4 e = MATERIAL_TEXEL(baked_material_4, 4u);
+    uvec4 f = MATERIAL_TEXEL(baked_material_5, 5u);
+    uvec4 g = MATERIAL_TEXEL(baked_material_6, 6u);
+    uvec4 h = MATERIAL_TEXEL(baked_material_7, 7u);
     Material m;
     m.base_color = uintBitsToFloat(a.xyz);
     m.kind_flags = a.w;
@@ -56,12 +58,13 @@ TextureHeader load_texture_header(RenderConstants constants, uint index) {
     return header;
 }
 
+#define LIGHT_TEXEL(baked, k) (BAKES_LIGHTS ? baked(index) : LOAD4(TABLES, base + k))
 Light load_light(RenderConstants constants, uint index) {
     uint base = constants.lights + index * LIGHT_TEXELS;
-    uvec4 a = LOAD4(TABLES, base);
-    uvec4 b = LOAD4(TABLES, base + 1u);
-    uvec4 c = LOAD4(TABLES, base + 2u);
-    uvec4 d = LOAD4(TABLES, base + 3u);
+    uvec4 a = LIGHT_TEXEL(baked_light_0, 0u);
+    uvec4 b = LIGHT_TEXEL(baked_light_1, 1u);
+    uvec4 c = LIGHT_TEXEL(baked_light_2, 2u);
+    uvec4 d = LIGHT_TEXEL(baked_light_3, 3u);
     Light light;
     light.position = uintBitsToFloat(a.xyz);
     light.kind = a.w;

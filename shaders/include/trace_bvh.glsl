@@ -87,10 +87,10 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alph
     trace.world_origin = ray.origin;
     trace.world_direction = ray.direction;
     trace.alpha_key = alpha_key;
-    if (BAKED) {
+    if (BAKES_GEOMETRY) {
         // Done at once.
         trace.current = NONE;
-        if (!ray.any_hit || trace_occluded(ray)) trace.hit = trace_nearest(ray);
+        if (!ray.any_hit || trace_occluded(constants, ray)) trace.hit = trace_nearest(constants, ray);
     }
 }
 

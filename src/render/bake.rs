@@ -1,68 +1,153 @@
-//! Whether a scene is compiled into the kernel: a rule of scene and device.
+//! What of a scene is compiled into the kernel: a rule of scene and device.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use crate::gpu::specialize::BakedTriangle;
+use crate::gpu::specialize::{BakedScene, BakedTable, BakedTriangle};
 use crate::gpu::{DeviceInfo, DeviceKind, TraceBackend};
-use crate::layout::{LeafSlot, SceneArray};
-use crate::prepare::Prepared;
+use crate::layout::{LIGHT_TEXELS, LIGHT_TRIANGLE, LeafSlot, Light, MATERIAL_TEXELS, NONE, SceneArray, Texel};
+use crate::prepare::{LightChoice, Prepared};
 
 /// Most triangles that are compiled in (docs/benchmarks).
 pub const MOST_BAKED_TRIANGLES: u64 = 128;
+/// Most materials, and most lights, likewise.
+pub const MOST_BAKED_RECORDS: usize = 16;
+
+const GEOMETRY: u32 = 1;
+const MATERIALS: u32 = 2;
+const LIGHTS: u32 = 4;
+
+/// The part of the kernel key.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Baked {
+    /// Specialisation constant BAKED of shaders/include/features.glsl.
+    pub parts: u32,
+    /// Hash of what is compiled in.
+    pub hash: u64,
+}
 
 /// What is compiled in, and why, or why not.
 #[derive(Clone, Debug, Default)]
 pub struct Bake {
-    /// All triangles of the scene; none if it is not compiled in.
-    pub triangles: Vec<BakedTriangle>,
-    /// Why.
+    scene: BakedScene,
+    parts: u32,
+    /// Why geometry is or is not compiled in.
     pub reason: String,
 }
 
 impl Bake {
     /// Chooses for a scene on a device; `wanted` is false for `--no-bake`.
     pub fn choose(prepared: &Prepared, device: &DeviceInfo, trace: TraceBackend, wanted: bool) -> Self {
-        let count = prepared.statistics.triangles;
-        let features = &prepared.features;
-        let no = |reason: &str| Self { triangles: Vec::new(), reason: reason.to_owned() };
         if !wanted {
-            return no("--no-bake");
+            return Self { reason: String::from("--no-bake"), ..Self::default() };
         }
         if device.kind != DeviceKind::Cpu {
-            return no("the device is no CPU");
+            return Self { reason: String::from("the device is no CPU"), ..Self::default() };
         }
-        if trace != TraceBackend::Bvh {
-            return no("rays are traced by the device");
+        let mut this = Self::default();
+        match geometry_refused(prepared, trace) {
+            Some(reason) => this.reason = reason,
+            None => {
+                let count = prepared.statistics.triangles;
+                this.reason = format!("{count} triangles, at most {MOST_BAKED_TRIANGLES}");
+                this.add_geometry(prepared);
+            }
         }
-        if features.instances || features.alpha || features.panes {
-            return no("the scene has instances, alpha or panes");
-        }
-        if count == 0 || count > MOST_BAKED_TRIANGLES {
-            return no(&format!("{count} triangles are not 1 to {MOST_BAKED_TRIANGLES}"));
-        }
-        let triangles = triangles(prepared);
-        Self { reason: format!("{count} triangles of at most {MOST_BAKED_TRIANGLES}"), triangles }
+        this.add_materials(prepared);
+        this.add_lights(prepared);
+        this
     }
 
-    /// What is compiled in as a number for the kernel key.
-    pub fn key(&self) -> Option<u64> {
+    /// What is compiled in.
+    pub fn scene(&self) -> Option<&BakedScene> {
+        (self.parts != 0).then_some(&self.scene)
+    }
+
+    /// The part of the kernel key.
+    pub fn key(&self) -> Baked {
         let mut hasher = DefaultHasher::new();
-        for triangle in &self.triangles {
-            (triangle.slot, triangle.vertices.map(|v| v.map(f32::to_bits))).hash(&mut hasher);
+        self.scene.hash(&mut hasher);
+        Baked { parts: self.parts, hash: hasher.finish() }
+    }
+
+    /// Whether geometry is compiled in.
+    pub fn has_geometry(&self) -> bool {
+        self.parts & GEOMETRY != 0
+    }
+
+    /// Compiles in the geometry, whatever the rule says.
+    pub fn add_geometry(&mut self, prepared: &Prepared) {
+        self.scene.triangles = triangles(prepared);
+        self.scene.lamps_only = prepared.features.lights == 1 << LIGHT_TRIANGLE;
+        self.parts |= GEOMETRY;
+    }
+
+    fn add_materials(&mut self, prepared: &Prepared) {
+        let start = prepared.constants.materials;
+        let records = records(prepared, start, prepared.constants.textures, MATERIAL_TEXELS);
+        if (1..=MOST_BAKED_RECORDS).contains(&records.len()) {
+            self.scene.tables.push(BakedTable { name: "baked_material", records });
+            self.parts |= MATERIALS;
         }
-        (!self.triangles.is_empty()).then(|| hasher.finish())
+    }
+
+    fn add_lights(&mut self, prepared: &Prepared) {
+        let (start, count) = (prepared.constants.lights, prepared.constants.light_count);
+        if !(1..=MOST_BAKED_RECORDS as u32).contains(&count) {
+            return;
+        }
+        let lights = records(prepared, start, start + count * LIGHT_TEXELS, LIGHT_TEXELS);
+        let lamps = lights.iter().map(|light| {
+            let light: Light = bytemuck::cast([light[0], light[1], light[2], light[3]]);
+            let is_triangle = light.kind == LIGHT_TRIANGLE && light.slot != NONE;
+            let slot = if is_triangle { slot_texels(prepared, light.slot) } else { [Texel::default(); 3] };
+            slot.to_vec()
+        });
+        let lamps = BakedTable { name: "baked_lamp", records: lamps.collect() };
+        self.scene.tables.extend([BakedTable { name: "baked_light", records: lights }, lamps]);
+        if prepared.features.light_choice != LightChoice::Bvh {
+            let tables: &[u32] = bytemuck::cast_slice(&prepared.arrays[SceneArray::Tables as usize]);
+            let words = &tables[prepared.constants.light_cdf_word as usize..][..=count as usize];
+            let record = |&word: &u32| vec![[word, 0, 0, 0]];
+            self.scene.tables.push(BakedTable { name: "baked_light_cdf", records: words.iter().map(record).collect() });
+            self.scene.light_cdf = words.to_vec();
+        }
+        self.parts |= LIGHTS;
     }
 }
 
-/// Every triangle of the scene, in the order of the slots.
-pub fn triangles(prepared: &Prepared) -> Vec<BakedTriangle> {
+/// Why the rule leaves geometry out, if it does.
+fn geometry_refused(prepared: &Prepared, trace: TraceBackend) -> Option<String> {
+    let count = prepared.statistics.triangles;
+    let features = &prepared.features;
+    if trace != TraceBackend::Bvh {
+        Some(String::from("the device traces the rays"))
+    } else if features.instances || features.alpha || features.panes {
+        Some(String::from("there are instances, alpha or panes"))
+    } else if count == 0 || count > MOST_BAKED_TRIANGLES {
+        Some(format!("{count} triangles, not 1 to {MOST_BAKED_TRIANGLES}"))
+    } else {
+        None
+    }
+}
+
+/// The records of a table between two texels.
+fn records(prepared: &Prepared, start: u32, end: u32, texels: u32) -> Vec<Vec<Texel>> {
+    let table = &prepared.arrays[SceneArray::Tables as usize][start as usize..end as usize];
+    table.chunks_exact(texels as usize).map(<[Texel]>::to_vec).collect()
+}
+
+fn slot_texels(prepared: &Prepared, slot: u32) -> [Texel; 3] {
     let slots = &prepared.arrays[SceneArray::Slots as usize];
-    let of_mesh = |mesh| prepared.triangle_slots(mesh);
-    let all = prepared.meshes.iter().flat_map(of_mesh);
-    all.map(|slot| {
-        let leaf: LeafSlot =
-            bytemuck::cast([slots[3 * slot as usize], slots[3 * slot as usize + 1], slots[3 * slot as usize + 2]]);
-        BakedTriangle { slot, vertices: leaf.vertices }
-    })
-    .collect()
+    [0, 1, 2].map(|i| slots[3 * slot as usize + i])
+}
+
+/// Every triangle of the scene, in the order of the slots.
+fn triangles(prepared: &Prepared) -> Vec<BakedTriangle> {
+    let slots = prepared.meshes.iter().flat_map(|mesh| prepared.triangle_slots(mesh));
+    slots
+        .map(|slot| {
+            let leaf: LeafSlot = bytemuck::cast(slot_texels(prepared, slot));
+            BakedTriangle { slot, vertices: leaf.vertices }
+        })
+        .collect()
 }

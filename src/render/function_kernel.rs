@@ -66,7 +66,7 @@ impl FunctionCall<'_> {
                 workgroup_size: 64,
                 constants: &specialization,
                 driver_specializes: false,
-                baked: &[],
+                baked: None,
                 push_constant_bytes: 4,
                 sets: &[&set],
             },

@@ -17,7 +17,7 @@ mod slices;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-pub use bake::{Bake, MOST_BAKED_TRIANGLES, triangles as baked_triangles};
+pub use bake::{Bake, Baked, MOST_BAKED_RECORDS, MOST_BAKED_TRIANGLES};
 pub use function_kernel::FunctionCall;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};

@@ -274,7 +274,7 @@ fn build_kernel(
             workgroup_size,
             constants: &key.specialization(),
             driver_specializes: overrides.driver_specializes,
-            baked: &bake.triangles,
+            baked: bake.scene(),
             push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
             sets: &sets,
         },

@@ -127,7 +127,8 @@ fn render_constants_fields() -> Vec<Field> {
         camera_forward, vertex_texels, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
         materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
         environment_height, environment_marginal_word, environment_conditional_word, ggx_albedo, environment_radiance,
-        environment_cos, scene_center, environment_sin, light_bvh, light_bvh_counts, near_lights, clamp_indirect)
+        environment_cos, scene_center, environment_sin, light_bvh, light_bvh_counts, near_lights, clamp_indirect,
+        zero, unused)
 }
 
 #[test]

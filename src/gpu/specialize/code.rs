@@ -16,6 +16,7 @@ struct Types {
     uint: u32,
     boolean: u32,
     pair: u32,
+    quadruple: u32,
 }
 
 /// Code in the making.
@@ -46,6 +47,7 @@ impl<'a> Code<'a> {
             uint,
             boolean: find(op::TYPE_BOOL, &[])?,
             pair: find(op::TYPE_VECTOR, &[uint, 2])?,
+            quadruple: find(op::TYPE_VECTOR, &[uint, 4])?,
         };
         Some(Self {
             module,
@@ -175,6 +177,11 @@ impl<'a> Code<'a> {
     /// A vector of two words.
     pub(super) fn pair(&mut self, x: u32, y: u32) -> u32 {
         self.value(op::COMPOSITE_CONSTRUCT, self.types.pair, &[x, y])
+    }
+
+    /// A vector of four words.
+    pub(super) fn quadruple(&mut self, words: [u32; 4]) -> u32 {
+        self.value(op::COMPOSITE_CONSTRUCT, self.types.quadruple, &words)
     }
 
     /// The components of a vector of three floats.

@@ -11,12 +11,28 @@ pub struct BakedTriangle {
     pub vertices: [[f32; 3]; 3],
 }
 
+impl std::hash::Hash for BakedTriangle {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        (self.slot, self.vertices.map(|v| v.map(f32::to_bits))).hash(state);
+    }
+}
+
 /// A plane with the triangles in it.
 pub(super) struct Face {
     /// One or two triangles; of two, the second is a neighbour of the first.
     pub(super) triangles: Vec<BakedTriangle>,
     /// Normal of any length, the largest component 1.
     pub(super) normal: [f32; 3],
+}
+
+impl Face {
+    /// Whether no triangle lies on the one side of its plane, or none on the other.
+    pub(super) fn supports(&self, triangles: &[BakedTriangle]) -> bool {
+        let n = cross(&self.triangles[0]);
+        let a = points(&self.triangles[0])[0];
+        let heights = || triangles.iter().flat_map(points).map(|p| n.dot(p - a));
+        heights().all(|height| height >= 0.0) || heights().all(|height| height <= 0.0)
+    }
 }
 
 /// Pairs neighbours that lie in one plane as well as their vertices are known: a distance to the plane is only asked for

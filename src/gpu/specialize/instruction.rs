@@ -43,6 +43,7 @@ pub(super) mod op {
     pub(in super::super) const COMPOSITE_EXTRACT: u16 = 81;
     pub(in super::super) const COPY_OBJECT: u16 = 83;
     pub(in super::super) const BITCAST: u16 = 124;
+    pub(in super::super) const I_ADD: u16 = 128;
     pub(in super::super) const F_ADD: u16 = 129;
     pub(in super::super) const F_SUB: u16 = 131;
     pub(in super::super) const F_MUL: u16 = 133;
@@ -52,6 +53,7 @@ pub(super) mod op {
     pub(in super::super) const SELECT: u16 = 169;
     pub(in super::super) const I_EQUAL: u16 = 170;
     pub(in super::super) const S_LESS_THAN: u16 = 177;
+    pub(in super::super) const U_LESS_THAN_EQUAL: u16 = 178;
     pub(in super::super) const F_ORD_LESS_THAN: u16 = 184;
     pub(in super::super) const F_ORD_GREATER_THAN: u16 = 186;
     pub(in super::super) const SHIFT_RIGHT_LOGICAL: u16 = 194;

@@ -17,7 +17,7 @@ mod module;
 mod propagate;
 mod uses;
 
-pub use bake::bake;
+pub use bake::{BakedScene, BakedTable, bake};
 pub use faces::BakedTriangle;
 
 use constants::Constants;
