@@ -16,7 +16,7 @@ from pathlib import Path
 
 from run import HERE, InstallationFailed, enter_environment, processor
 
-SCENES = ("cornell", "bumpy_9k", "bumpy_159k", "bumpy_2m")
+SCENES = ("cornell", "cornell_moved", "bumpy_9k", "bumpy_159k", "bumpy_2m")
 
 
 def arguments():

@@ -1,8 +1,8 @@
 //! What of a scene is compiled into the kernel: a rule of scene and device.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{Hash, Hasher};
 
-use crate::gpu::specialize::{BakedScene, BakedTable, BakedTriangle};
+use crate::gpu::specialize::{BakedScene, BakedTable, BakedTriangle, bake};
 use crate::gpu::{DeviceInfo, DeviceKind, TraceBackend};
 use crate::layout::{LIGHT_TEXELS, LIGHT_TRIANGLE, LeafSlot, Light, MATERIAL_TEXELS, NONE, SceneArray, Texel};
 use crate::prepare::{LightChoice, Prepared};
@@ -57,16 +57,16 @@ impl Bake {
         this
     }
 
-    /// What is compiled in.
-    pub fn scene(&self) -> Option<&BakedScene> {
-        (self.parts != 0).then_some(&self.scene)
-    }
-
-    /// The part of the kernel key.
-    pub fn key(&self) -> Baked {
-        let mut hasher = DefaultHasher::new();
-        self.scene.hash(&mut hasher);
-        Baked { parts: self.parts, hash: hasher.finish() }
+    /// A kernel with the scene compiled in, and what of it that is. A kernel that lacks the functions for it, as one of
+    /// `--shaders` may, stays as it is.
+    pub fn apply(&self, spirv: Vec<u32>) -> (Vec<u32>, Baked) {
+        if self.parts == 0 {
+            return (spirv, Baked::default());
+        }
+        match bake(&spirv, &self.scene) {
+            Some(words) => (words, Baked { parts: self.parts, hash: fingerprint(&self.scene) }),
+            None => (spirv, Baked::default()),
+        }
     }
 
     /// Whether geometry is compiled in.
@@ -150,4 +150,23 @@ fn triangles(prepared: &Prepared) -> Vec<BakedTriangle> {
             BakedTriangle { slot, vertices: leaf.vertices }
         })
         .collect()
+}
+
+/// FNV-1a (Fowler, Noll, Vo), which is the same in every build.
+struct Fnv(u64);
+
+impl Hasher for Fnv {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        self.0 = bytes.iter().fold(self.0, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+    }
+}
+
+fn fingerprint(scene: &BakedScene) -> u64 {
+    let mut hasher = Fnv(0xcbf2_9ce4_8422_2325);
+    scene.hash(&mut hasher);
+    hasher.finish()
 }

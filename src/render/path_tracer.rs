@@ -90,10 +90,11 @@ impl PathTracer {
         let mut slices = slices?;
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let bake = Bake::choose(prepared, &gpu.info, trace, settings.bake && !overrides.driver_specializes);
         let mut key = KernelKey::new(prepared, camera, settings, trace, form);
-        key.baked = bake.key();
-        let kernel = build_kernel(gpu, &key, &bake, settings, overrides, &buffers, &constants_buffer, &slices)?;
+        let bake = Bake::choose(prepared, &gpu.info, trace, settings.bake && !overrides.driver_specializes);
+        let spirv;
+        (spirv, key.baked) = bake.apply(kernel_spirv(&key, settings)?);
+        let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
@@ -241,14 +242,12 @@ fn effective_max_bounces(settings: &Settings) -> u32 {
 fn build_kernel(
     gpu: &Arc<Gpu>,
     key: &KernelKey,
-    bake: &Bake,
-    settings: &Settings,
+    spirv: &[u32],
     overrides: BindingOverride,
     buffers: &SceneBuffers,
     constants: &Buffer,
     slices: &[Slice],
 ) -> Result<Kernel> {
-    let spirv = kernel_spirv(key, settings)?;
     let arrays = buffers.bindings();
     let array_binding = array_binding(buffers, key.array_form, &arrays);
     let sets: Vec<Vec<BindingResource<'_>>> = slices
@@ -270,11 +269,10 @@ fn build_kernel(
         gpu,
         &KernelDescription {
             name: "path_trace",
-            spirv: &spirv,
+            spirv,
             workgroup_size,
             constants: &key.specialization(),
             driver_specializes: overrides.driver_specializes,
-            baked: bake.scene(),
             push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
             sets: &sets,
         },

@@ -53,7 +53,7 @@ pub fn bake(spirv: &[u32], scene: &BakedScene) -> Option<Vec<u32>> {
                 let words: Vec<u32> = table.records.iter().map(|record| record[texel][i]).collect();
                 emit_choice(&mut code, parameters[0], &words)
             });
-            let result = code.quadruple(words);
+            let result = code.vector(&words);
             bodies.push((function, code.end(result)));
         }
     }
@@ -101,6 +101,10 @@ fn bake_searches(code: &mut Code<'_>, scene: &BakedScene, bodies: &mut Vec<(usiz
         let result = emit_search(code, &ray, faces, search);
         bodies.push((function, code.end(result)));
     }
+    let function = code.find_function("baked_slots(")?;
+    code.begin(function);
+    let count = code.constant_uint(scene.triangles.iter().map(|t| t.slot + 1).max().unwrap_or(0));
+    bodies.push((function, code.end(count)));
     Some(())
 }
 
@@ -119,13 +123,15 @@ struct RayIds {
     t_max: u32,
     /// 0 that no compiler knows.
     zero: u32,
+    /// Squared speed towards a plane below which the distance to it is doubtful.
+    grazing: u32,
     /// The set of excluded slots, a word for 32 of them; `None` where the scene has none of these.
     excluded: Vec<Option<u32>>,
 }
 
 impl RayIds {
     fn new(code: &mut Code<'_>, parameters: &[u32], faces: &[Face]) -> Option<Self> {
-        let &[origin, direction, row_x, row_y, t_max, zero, from, towards] = parameters else { return None };
+        let &[origin, direction, row_x, row_y, t_max, zero, grazing, from, towards] = parameters else { return None };
         let [origin, direction, row_x, row_y] = [origin, direction, row_x, row_y].map(|v| code.components(v));
         let slots = || faces.iter().flat_map(|face| &face.triangles).map(|t| t.slot);
         let words = slots().max().map_or(0, |slot| slot / SET_BITS + 1);
@@ -137,7 +143,7 @@ impl RayIds {
                 })
             })
             .collect();
-        Some(Self { origin, direction, row_x, row_y, t_max, zero, excluded })
+        Some(Self { origin, direction, row_x, row_y, t_max, zero, grazing, excluded })
     }
 
     /// A vertex relative to the origin.
@@ -200,12 +206,24 @@ impl RayIds {
         sum.unwrap_or_else(|| code.constant_float(0.0))
     }
 
-    /// The distance to the plane of a face. In units of rounding, it is as good as the one that a test of the triangle
-    /// interpolates: both take differences of vertices and origin.
+    fn speed(&self, code: &mut Code<'_>, face: &Face) -> u32 {
+        self.along(code, face.normal, self.direction)
+    }
+
+    /// Whether the distance to the plane is doubtful: never along an axis, where height and speed are not sums.
+    fn is_grazing(&self, code: &mut Code<'_>, face: &Face) -> Option<u32> {
+        (face.normal.iter().filter(|n| **n != 0.0).count() > 1).then(|| {
+            let speed = self.speed(code, face);
+            let square = code.float(op::F_MUL, &[speed, speed]);
+            code.bool(op::F_ORD_LESS_THAN_EQUAL, &[square, self.grazing])
+        })
+    }
+
+    /// The distance to the plane of a face.
     fn distance(&self, code: &mut Code<'_>, face: &Face) -> u32 {
         let relative = self.relative(code, face.triangles[0].vertices[0]);
         let height = self.along(code, face.normal, relative);
-        let speed = self.along(code, face.normal, self.direction);
+        let speed = self.speed(code, face);
         let one = code.constant_float(1.0);
         let inverse = code.float(op::F_DIV, &[one, speed]);
         code.float(op::F_MUL, &[height, inverse])
@@ -233,20 +251,25 @@ impl RayIds {
 fn emit_search(code: &mut Code<'_>, ray: &RayIds, faces: &[Face], search: Search) -> u32 {
     let none = code.constant_uint(u32::MAX);
     let [zero_float, zero_int] = [code.constant_float(0.0), code.constant_int(0)];
-    let (mut nearest, mut slot, mut occluded) = (ray.t_max, none, None);
+    let (mut nearest, mut slot, mut occluded, mut doubtful) = (ray.t_max, none, None, None);
     for face in faces {
         let meets: Vec<u32> = face.triangles.iter().map(|triangle| ray.meets(code, triangle)).collect();
         let word = meets[1..].iter().fold(meets[0], |word, &other| code.int(op::BITWISE_OR, &[word, other]));
+        let met = code.bool(op::S_LESS_THAN, &[word, zero_int]);
+        if let Some(grazing) = ray.is_grazing(code, face) {
+            let both = code.bool(op::LOGICAL_AND, &[met, grazing]);
+            doubtful = Some(either(code, doubtful, both));
+        }
         let distance = ray.distance(code, face);
         let conditions = [
-            code.bool(op::S_LESS_THAN, &[word, zero_int]),
+            met,
             code.bool(op::F_ORD_GREATER_THAN, &[distance, zero_float]),
             code.bool(op::F_ORD_LESS_THAN, &[distance, nearest]),
             ray.is_allowed(code, face),
         ];
         let hit = conditions[1..].iter().fold(conditions[0], |all, &one| code.bool(op::LOGICAL_AND, &[all, one]));
         if search == Search::Occluded {
-            occluded = Some(occluded.map_or(hit, |before| code.bool(op::LOGICAL_OR, &[before, hit])));
+            occluded = Some(either(code, occluded, hit));
             continue;
         }
         let mut which = code.constant_uint(face.triangles[0].slot);
@@ -258,12 +281,21 @@ fn emit_search(code: &mut Code<'_>, ray: &RayIds, faces: &[Face], search: Search
         nearest = code.float(op::SELECT, &[hit, distance, nearest]);
         slot = code.uint(op::SELECT, &[hit, which, slot]);
     }
-    match (search, occluded) {
-        (Search::Occluded, Some(occluded)) => occluded,
-        (Search::Occluded, None) => code.bool(op::S_LESS_THAN, &[zero_int, zero_int]),
-        (Search::Nearest, _) => {
-            let bits = code.uint(op::BITCAST, &[nearest]);
-            code.pair(bits, slot)
-        }
+    let doubtful = flag(code, doubtful);
+    if search == Search::Occluded {
+        let occluded = flag(code, occluded);
+        return code.vector(&[occluded, doubtful]);
     }
+    let bits = code.uint(op::BITCAST, &[nearest]);
+    code.vector(&[bits, slot, doubtful])
+}
+
+fn either(code: &mut Code<'_>, one: Option<u32>, other: u32) -> u32 {
+    one.map_or(other, |one| code.bool(op::LOGICAL_OR, &[one, other]))
+}
+
+/// 1 if it holds.
+fn flag(code: &mut Code<'_>, condition: Option<u32>) -> u32 {
+    let [one, zero] = [1, 0].map(|n| code.constant_uint(n));
+    condition.map_or(zero, |condition| code.uint(op::SELECT, &[condition, one, zero]))
 }

@@ -15,8 +15,8 @@ struct Types {
     int: u32,
     uint: u32,
     boolean: u32,
-    pair: u32,
-    quadruple: u32,
+    /// Of two, three and four words.
+    vectors: [u32; 3],
 }
 
 /// Code in the making.
@@ -46,8 +46,11 @@ impl<'a> Code<'a> {
             int: find(op::TYPE_INT, &[32, 1])?,
             uint,
             boolean: find(op::TYPE_BOOL, &[])?,
-            pair: find(op::TYPE_VECTOR, &[uint, 2])?,
-            quadruple: find(op::TYPE_VECTOR, &[uint, 4])?,
+            vectors: [
+                find(op::TYPE_VECTOR, &[uint, 2])?,
+                find(op::TYPE_VECTOR, &[uint, 3])?,
+                find(op::TYPE_VECTOR, &[uint, 4])?,
+            ],
         };
         Some(Self {
             module,
@@ -174,14 +177,9 @@ impl<'a> Code<'a> {
         self.value(opcode, self.types.boolean, operands)
     }
 
-    /// A vector of two words.
-    pub(super) fn pair(&mut self, x: u32, y: u32) -> u32 {
-        self.value(op::COMPOSITE_CONSTRUCT, self.types.pair, &[x, y])
-    }
-
-    /// A vector of four words.
-    pub(super) fn quadruple(&mut self, words: [u32; 4]) -> u32 {
-        self.value(op::COMPOSITE_CONSTRUCT, self.types.quadruple, &words)
+    /// A vector of two to four words.
+    pub(super) fn vector(&mut self, words: &[u32]) -> u32 {
+        self.value(op::COMPOSITE_CONSTRUCT, self.types.vectors[words.len() - 2], words)
     }
 
     /// The components of a vector of three floats.

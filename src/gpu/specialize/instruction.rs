@@ -56,6 +56,7 @@ pub(super) mod op {
     pub(in super::super) const U_LESS_THAN_EQUAL: u16 = 178;
     pub(in super::super) const F_ORD_LESS_THAN: u16 = 184;
     pub(in super::super) const F_ORD_GREATER_THAN: u16 = 186;
+    pub(in super::super) const F_ORD_LESS_THAN_EQUAL: u16 = 188;
     pub(in super::super) const SHIFT_RIGHT_LOGICAL: u16 = 194;
     pub(in super::super) const SHIFT_LEFT_LOGICAL: u16 = 196;
     pub(in super::super) const BITWISE_OR: u16 = 197;
