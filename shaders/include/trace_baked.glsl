@@ -19,6 +19,7 @@ const float BAKED_GRAZING = 0.000244140625;
 struct BakedRay {
     vec3 row_x;
     vec3 row_y;
+    vec3 row_z;
     float t_max;
     float grazing;  // squared speed towards a plane at and below which the distance to it is not to be trusted
 };
@@ -30,6 +31,8 @@ BakedRay baked_ray(Ray ray) {
     BakedRay b;
     b.row_x = space.x_largest ? vec3(x, 1.0, 0.0) : (space.y_largest ? vec3(0.0, x, 1.0) : vec3(1.0, 0.0, x));
     b.row_y = space.x_largest ? vec3(y, 0.0, 1.0) : (space.y_largest ? vec3(1.0, y, 0.0) : vec3(0.0, 1.0, y));
+    float z = space.shear.z;
+    b.row_z = space.x_largest ? vec3(z, 0.0, 0.0) : (space.y_largest ? vec3(0.0, z, 0.0) : vec3(0.0, 0.0, z));
     b.t_max = ray_is_valid(ray) ? ray.t_max : 0.0;
     b.grazing = sqr(max_component(abs(ray.direction)) * BAKED_GRAZING);
     return b;
@@ -44,14 +47,14 @@ struct Found {
 // `zero` is a 0 that no compiler knows: x + zero turns −0 into +0.
 //
 // Distance (as bits) and slot of the nearest triangle, NONE if there is none, and whether a triangle was doubtful.
-uvec3 baked_nearest(const vec3 origin, const vec3 direction, const vec3 row_x, const vec3 row_y, const float t_max,
-                    const float zero, const float grazing, const uint from, const uint towards) {
+uvec3 baked_nearest(const vec3 origin, const vec3 direction, const vec3 row_x, const vec3 row_y, const vec3 row_z,
+                    const float t_max, const float zero, const float grazing, const uint from, const uint towards) {
     return uvec3(0u, NONE, 0u);
 }
 
 // Whether there is any, and whether a triangle was doubtful.
-uvec2 baked_occluded(const vec3 origin, const vec3 direction, const vec3 row_x, const vec3 row_y, const float t_max,
-                     const float zero, const float grazing, const uint from, const uint towards) {
+uvec2 baked_occluded(const vec3 origin, const vec3 direction, const vec3 row_x, const vec3 row_y, const vec3 row_z,
+                     const float t_max, const float zero, const float grazing, const uint from, const uint towards) {
     return uvec2(0u);
 }
 
@@ -84,7 +87,7 @@ Found search_slots(Ray ray) {
 
 Found find_nearest(RenderConstants constants, Ray ray) {
     BakedRay b = baked_ray(ray);
-    uvec3 found = baked_nearest(ray.origin, ray.direction, b.row_x, b.row_y, b.t_max, constants.zero, b.grazing,
+    uvec3 found = baked_nearest(ray.origin, ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
                                 ray.from.slot, ray.towards.slot);
     if (found.z != 0u) return search_slots(ray);
     return Found(found.y, uintBitsToFloat(found.x));
@@ -104,7 +107,7 @@ Hit trace_nearest(RenderConstants constants, Ray ray) {
 
 bool trace_occluded(RenderConstants constants, Ray ray) {
     BakedRay b = baked_ray(ray);
-    uvec2 found = baked_occluded(ray.origin, ray.direction, b.row_x, b.row_y, b.t_max, constants.zero, b.grazing,
+    uvec2 found = baked_occluded(ray.origin, ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
                                  ray.from.slot, ray.towards.slot);
     if (found.y != 0u) return search_slots(ray).slot != NONE;
     return found.x != 0u;
