@@ -57,6 +57,13 @@ impl Bake {
         this
     }
 
+    /// Compiles in all that can be, whatever the rule says of geometry.
+    pub fn add_all(&mut self, prepared: &Prepared) {
+        self.add_geometry(prepared);
+        self.add_materials(prepared);
+        self.add_lights(prepared);
+    }
+
     /// A kernel with the scene compiled in, and what of it that is. A kernel that lacks the functions for it, as one of
     /// `--shaders` may, stays as it is.
     pub fn apply(&self, spirv: Vec<u32>) -> (Vec<u32>, Baked) {
