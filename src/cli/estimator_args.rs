@@ -45,9 +45,9 @@ pub(crate) struct EstimatorArgs {
     /// cones that are a quarter of a pixel wide and widen at each scattering event.
     #[arg(long, help_heading = "Light transport")]
     no_mip: bool,
-    /// Leave small scenes out of the kernel: by default, on software devices, the triangles of a small scene are
-    /// compiled in
-    #[arg(long)]
+    /// Compile nothing of the scene into the kernel; without it, on CPU devices, small scenes and small tables of materials
+    /// and lights are.
+    #[arg(long, help_heading = "Device")]
     no_bake: bool,
 
     /// Image of the environment (.hdr or .exr, latitude/longitude), in place of the scene's.

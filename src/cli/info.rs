@@ -6,8 +6,9 @@ use clap::Args;
 use serde_json::{Value, json};
 use sunfleck::scene::{AlphaMode, Bsdf, Environment, Lobe, Material, Projection, PunctualKind, Scene, load};
 
+use sunfleck::gpu::{DeviceKind, TraceBackend};
 use sunfleck::prepare::Prepared;
-use sunfleck::render::{Settings, prepare_scene};
+use sunfleck::render::{Bake, BakeReport, Settings, prepare_scene};
 
 use super::{devices, print_json, print_warnings};
 
@@ -217,7 +218,13 @@ fn describe_prepared(prepared: &Prepared) -> Value {
         "gpu_bytes_by_array": arrays,
         "kept": prepared.features.kept(),
         "dropped": prepared.features.dropped(),
+        "baked_on_cpu": baked_on_cpu(prepared),
     })
+}
+
+/// What a software device has compiled into its kernel.
+fn baked_on_cpu(prepared: &Prepared) -> BakeReport {
+    Bake::choose(prepared, DeviceKind::Cpu, TraceBackend::Bvh, true).planned()
 }
 
 fn print_prepared(prepared: &Prepared) {
@@ -239,6 +246,7 @@ fn print_prepared(prepared: &Prepared) {
     );
     eprintln!("  kernel needs {}", prepared.features.kept().join(", "));
     eprintln!("  left out     {}", prepared.features.dropped().join(", "));
+    eprintln!("  compiled in  {}, on CPU devices", baked_on_cpu(prepared));
 }
 
 fn print_for_people(scene: &Scene) {

@@ -3,7 +3,7 @@
 use std::hash::{Hash, Hasher};
 
 use crate::gpu::specialize::{BakedScene, BakedTable, BakedTriangle, bake};
-use crate::gpu::{DeviceInfo, DeviceKind, TraceBackend};
+use crate::gpu::{DeviceKind, TraceBackend};
 use crate::layout::{LIGHT_TEXELS, LIGHT_TRIANGLE, LeafSlot, Light, MATERIAL_TEXELS, NONE, SceneArray, Texel};
 use crate::prepare::{LightChoice, Prepared};
 
@@ -25,6 +25,22 @@ pub struct Baked {
     pub hash: u64,
 }
 
+/// What of a scene is compiled into a kernel.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct BakeReport {
+    /// `geometry`, `materials`, `lights`.
+    pub parts: Vec<&'static str>,
+    /// Why geometry is or is not among them.
+    pub reason: String,
+}
+
+impl std::fmt::Display for BakeReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let parts = if self.parts.is_empty() { String::from("nothing") } else { self.parts.join(", ") };
+        write!(f, "{parts} (geometry: {})", self.reason)
+    }
+}
+
 /// What is compiled in, and why, or why not.
 #[derive(Clone, Debug, Default)]
 pub struct Bake {
@@ -36,11 +52,11 @@ pub struct Bake {
 
 impl Bake {
     /// Chooses for a scene on a device; `wanted` is false for `--no-bake`.
-    pub fn choose(prepared: &Prepared, device: &DeviceInfo, trace: TraceBackend, wanted: bool) -> Self {
+    pub fn choose(prepared: &Prepared, device: DeviceKind, trace: TraceBackend, wanted: bool) -> Self {
         if !wanted {
             return Self { reason: String::from("--no-bake"), ..Self::default() };
         }
-        if device.kind != DeviceKind::Cpu {
+        if device != DeviceKind::Cpu {
             return Self { reason: String::from("the device is no CPU"), ..Self::default() };
         }
         let mut this = Self::default();
@@ -74,6 +90,18 @@ impl Bake {
             Some(words) => (words, Baked { parts: self.parts, hash: fingerprint(&self.scene) }),
             None => (spirv, Baked::default()),
         }
+    }
+
+    /// What is compiled in, for people and programs.
+    pub fn report(&self, baked: Baked) -> BakeReport {
+        let names = [(GEOMETRY, "geometry"), (MATERIALS, "materials"), (LIGHTS, "lights")];
+        let parts = names.into_iter().filter(|(bit, _)| baked.parts & bit != 0).map(|(_, name)| name).collect();
+        BakeReport { parts, reason: self.reason.clone() }
+    }
+
+    /// What the rule would compile in: [`Bake::apply`] may find that a shader lacks the functions for it.
+    pub fn planned(&self) -> BakeReport {
+        self.report(Baked { parts: self.parts, hash: 0 })
     }
 
     /// Whether geometry is compiled in.

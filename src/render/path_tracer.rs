@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use ash::vk::BufferUsageFlags as Usage;
 
-use super::bake::Bake;
+use super::bake::{Bake, BakeReport};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
@@ -48,6 +48,7 @@ pub struct PathTracer {
     slices: Vec<Slice>,
     buffers: SceneBuffers,
     overrides: BindingOverride,
+    bake: BakeReport,
     /// Seconds that compiling and uploading took.
     pub compile_seconds: f64,
     /// See `compile_seconds`.
@@ -91,7 +92,7 @@ impl PathTracer {
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut key = KernelKey::new(prepared, camera, settings, trace, form);
-        let bake = Bake::choose(prepared, &gpu.info, trace, settings.bake && !overrides.driver_specializes);
+        let bake = Bake::choose(prepared, gpu.info.kind, trace, settings.bake && !overrides.driver_specializes);
         let spirv;
         (spirv, key.baked) = bake.apply(kernel_spirv(&key, settings)?);
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
@@ -105,6 +106,7 @@ impl PathTracer {
             slices,
             buffers,
             overrides,
+            bake: bake.report(key.baked),
             compile_seconds,
             upload_seconds,
         })
@@ -113,6 +115,11 @@ impl PathTracer {
     /// What the kernel was built with.
     pub fn key(&self) -> &KernelKey {
         &self.key
+    }
+
+    /// What of the scene is compiled in.
+    pub fn bake_report(&self) -> &BakeReport {
+        &self.bake
     }
 
     /// Bytes of device memory in use.
