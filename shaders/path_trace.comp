@@ -237,14 +237,15 @@ bool passes_pane(inout LaneState lane, Surface surface, Hit hit) {
     return true;
 }
 
-// A ray that looks for the nearest surface has come back: adds what it met and prepares the next ray. False if the path
+// The ray leaves the scene.
+void leave_scene(inout LaneState lane) {
+    if (HAS_VOLUME) lane.throughput *= transmittance(constants, lane.media, INFINITY);
+    add_environment(lane);
+}
+
+// A ray that looks for the nearest surface has met one: adds what it emits and prepares the next ray. False if the path
 // ends.
-bool shade(inout LaneState lane, Hit hit) {
-    if (hit.triangle.slot == NONE) {
-        if (HAS_VOLUME) lane.throughput *= transmittance(constants, lane.media, INFINITY);
-        add_environment(lane);
-        return false;
-    }
+bool shade_surface(inout LaneState lane, Hit hit) {
     vec3 view = -lane.ray.direction;
     // A shadow ray has the scattered ray's cone, and leaves it as it is.
     float width = HAS_MIP ? cone_width(lane.cone, hit.t) : 0.0;
@@ -272,6 +273,12 @@ bool shade(inout LaneState lane, Hit hit) {
     return goes_on;
 }
 
+bool shade(inout LaneState lane, Hit hit) {
+    if (hit.triangle.slot != NONE) return shade_surface(lane, hit);
+    leave_scene(lane);
+    return false;
+}
+
 // The lane's ray has been traced. False if the sample is finished.
 bool advance_path(inout LaneState lane, Hit hit) {
     lane.rays += 1u;
@@ -287,6 +294,42 @@ bool advance_path(inout LaneState lane, Hit hit) {
     return finish_shadow(lane, free);
 }
 
+void next_sample(inout LaneState lane) {
+    finish_sample(lane);
+    if (lane.sample_index < lane.end_sample) start_sample(lane);
+}
+
+void render(inout LaneState lane, uint ray_limit) {
+    Trace trace;
+    trace_begin(trace, constants, lane.ray, alpha_key(lane));
+    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
+        trace_advance(trace, constants);
+        if (!trace_done(trace)) continue;
+        if (!advance_path(lane, trace_hit(trace))) next_sample(lane);
+        trace_begin(trace, constants, lane.ray, alpha_key(lane));
+    }
+}
+
+#if TRACE_BACKEND == TRACE_BVH
+// A search ends at once, so that all lanes shade together; the shadow ray is traced by a search of its own, which only asks
+// whether there is anything.
+void render_baked(inout LaneState lane, uint ray_limit) {
+    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
+        lane.rays += 1u;
+        Found found = find_nearest(constants, lane.ray);
+        bool goes_on = false;
+        // Behind the one test, the triangle is loaded once for the hit and for shading.
+        if (found.slot != NONE) goes_on = shade_surface(lane, found_hit(lane.ray, found));
+        else leave_scene(lane);
+        if (goes_on && lane.ray.any_hit) {
+            lane.rays += 1u;
+            goes_on = finish_shadow(lane, !trace_occluded(constants, lane.ray));
+        }
+        if (!goes_on) next_sample(lane);
+    }
+}
+#endif
+
 void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= slice.lanes) return;
@@ -299,17 +342,11 @@ void main() {
         if (lane.sample_index < lane.end_sample) start_sample(lane);
     }
     uint ray_limit = lane.rays + slice.ray_budget;
-    Trace trace;
-    trace_begin(trace, constants, lane.ray, alpha_key(lane));
-    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
-        trace_advance(trace, constants);
-        if (!trace_done(trace)) continue;
-        if (!advance_path(lane, trace_hit(trace))) {
-            finish_sample(lane);
-            if (lane.sample_index < lane.end_sample) start_sample(lane);
-        }
-        trace_begin(trace, constants, lane.ray, alpha_key(lane));
-    }
+#if TRACE_BACKEND == TRACE_BVH
+    if (BAKES_GEOMETRY) render_baked(lane, ray_limit);
+    else
+#endif
+    render(lane, ray_limit);
     bool complete = lane.sample_index >= lane.end_sample;
     results[index] = block_result(lane, complete);
     lanes[index] = lane;

@@ -460,6 +460,10 @@ pub struct RenderConstants {
     pub near_lights: u32,
     /// Most that a path may bring at once after two scattering events or more, largest component; 0 without a bound.
     pub clamp_indirect: f32,
+    /// 0, which no compiler knows.
+    pub zero: f32,
+    /// Unused, zero.
+    pub unused: [u32; 3],
 }
 
 /// What a dispatch does: lanes `0..lanes` render the atoms (block `first_block` + a / pixels, pixel a mod pixels) with

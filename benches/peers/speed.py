@@ -17,7 +17,7 @@ from pathlib import Path
 
 from run import HERE, InstallationFailed, enter_environment, processor
 
-SCENES = ("cornell", "bumpy_9k", "bumpy_159k", "bumpy_2m", "instances")
+SCENES = ("cornell", "cornell_moved", "bumpy_9k", "bumpy_159k", "bumpy_2m", "instances")
 
 
 def arguments():

@@ -13,6 +13,7 @@ layout(constant_id = 8) const uint ENVIRONMENT_SAMPLING = 0u;
 layout(constant_id = 9) const uint STACK_SIZE = 64u;
 layout(constant_id = 10) const uint SAMPLER = 0u;
 layout(constant_id = 11) const uint LIGHT_CHOICE = 1u;
+layout(constant_id = 12) const uint BAKED = 0u;
 
 const bool HAS_TEXTURES = (FEATURES & 1u) != 0u;
 const bool HAS_INSTANCES = (FEATURES & 2u) != 0u;
@@ -36,6 +37,11 @@ const bool HAS_PANES = (FEATURES & 262144u) != 0u;
 
 // Whether triangles have records with vertices, or only their kinds.
 const bool HAS_ATTRIBUTES = HAS_NORMALS || HAS_TEXTURES || HAS_NORMAL_MAPS || HAS_ANISOTROPY || HAS_VERTEX_COLORS;
+
+// What is compiled in as literals (src/gpu/specialize/bake.rs).
+const bool BAKES_GEOMETRY = (BAKED & 1u) != 0u;
+const bool BAKES_MATERIALS = (BAKED & 2u) != 0u;
+const bool BAKES_LIGHTS = (BAKED & 4u) != 0u;
 
 #define HAS_BSDF(kind) ((BSDFS & (1u << (kind))) != 0u)
 #define HAS_LIGHT(kind) ((LIGHTS & (1u << (kind))) != 0u)

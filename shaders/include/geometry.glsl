@@ -5,24 +5,6 @@
 #include "records.glsl"
 #include "trace.glsl"
 
-struct TriangleVertices {
-    vec3 a;
-    vec3 b;
-    vec3 c;
-};
-
-// By the triangle's number: see LeafSlot in src/layout.rs.
-TriangleVertices load_triangle(uint number) {
-    uint base = (number >> 1u) * SLOT_TEXELS;
-    uvec4 q0 = LOAD4(SLOTS, base);
-    uvec4 q1 = LOAD4(SLOTS, base + 1u);
-    uvec4 q2 = LOAD4(SLOTS, base + 2u);
-    bool second = (number & 1u) != 0u;
-    uvec3 b = second ? uvec3(q1.zw, q2.x) : uvec3(q0.w, q1.xy);
-    uvec3 c = second ? q2.yzw : uvec3(q1.zw, q2.x);
-    return TriangleVertices(uintBitsToFloat(q0.xyz), uintBitsToFloat(b), uintBitsToFloat(c));
-}
-
 // A point of a triangle in world space.
 struct SurfacePoint {
     vec3 position;

@@ -103,6 +103,10 @@ struct RenderConstants {
     uint light_bvh_counts;
     uint near_lights;
     float clamp_indirect;
+    float zero;
+    uint unused_0;
+    uint unused_1;
+    uint unused_2;
 };
 
 struct SliceConstants {

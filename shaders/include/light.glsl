@@ -23,8 +23,20 @@ bool scene_has_lights() { return LIGHTS != 0u; }
 // Lights without a place are not in the tree.
 const bool ONLY_NEAR_LIGHTS = (LIGHTS & (1u << LIGHT_DIRECTIONAL | 1u << LIGHT_ENVIRONMENT)) == 0u;
 
+uint baked_light_start(uint index) { return baked_light_cdf_0(index).x; }
+
+// cdf_sample_TABLES over the lights.
+CdfSample baked_light_pick(uint bits) {
+    uint x = bits >> 1u;
+    uint index = baked_light_search(x);
+    uint start = baked_light_start(index);
+    uint count = baked_light_start(index + 1u) - start;
+    return CdfSample(index, cdf_probability(count), x - start, count);
+}
+
 // The light that `bits` fall to, NONE if none. The table's last bin stands for the tree, if there is one.
 CdfSample light_pick(RenderConstants constants, LightReceiver receiver, uint bits) {
+    if (BAKES_LIGHTS && !HAS_LIGHT_BVH) return baked_light_pick(bits);
     if (!HAS_LIGHT_BVH) return cdf_sample_TABLES(constants.light_cdf_word, constants.light_count, bits);
     uint far = CDF_TOTAL - constants.light_bvh_counts;
     uint x = bits >> 1u;
@@ -36,6 +48,7 @@ CdfSample light_pick(RenderConstants constants, LightReceiver receiver, uint bit
 
 // Probability with which light_pick picks a light.
 float light_pick_probability(RenderConstants constants, LightReceiver receiver, uint light) {
+    if (BAKES_LIGHTS && !HAS_LIGHT_BVH) return cdf_probability(baked_light_start(light + 1u) - baked_light_start(light));
     if (!HAS_LIGHT_BVH) return cdf_probability_TABLES(constants.light_cdf_word, light);
     if (ONLY_NEAR_LIGHTS || light < constants.near_lights) return light_bvh_probability(constants, receiver, light);
     return cdf_probability_TABLES(constants.light_cdf_word, light - constants.near_lights);
@@ -53,8 +66,8 @@ bool emits_to_side(Material material, bool front) {
 }
 
 // Uniform by solid angle if the triangle is near, by area if not. `from` is the origin of the shadow ray.
-LightSample sample_triangle_light(RenderConstants constants, Light light, vec3 from, vec2 u, float pick) {
-    TriangleVertices vertices = load_triangle(light.slot);
+LightSample sample_triangle_light(RenderConstants constants, uint index, Light light, vec3 from, vec2 u, float pick) {
+    TriangleVertices vertices = load_lamp(index, light.slot);
     float root = sqrt(u.x);
     vec2 barycentric = vec2(root * (1.0 - u.y), root * u.y);
     float solid_angle = 0.0;
@@ -122,7 +135,7 @@ LightSample sample_light(RenderConstants constants, LightReceiver receiver, uvec
     Light light = load_light(constants, pick.index);
     if (HAS_LIGHT(LIGHT_TRIANGLE) && light.kind == LIGHT_TRIANGLE) {
         vec2 u = vec2(cdf_rest(pick, bits.y), to_unit(bits.z));
-        return sample_triangle_light(constants, light, from, u, pick.probability);
+        return sample_triangle_light(constants, pick.index, light, from, u, pick.probability);
     }
     if (HAS_LIGHT(LIGHT_ENVIRONMENT) && light.kind == LIGHT_ENVIRONMENT) {
         EnvironmentSample s = environment_sample(constants, environment_bits);

@@ -3,19 +3,21 @@
 #define RECORDS_GLSL
 #include "layout.glsl"
 #include "arrays.glsl"
+#include "baked_tables.glsl"
 #include "math.glsl"
 
 // Texels that no feature of the kernel looks at are not read: the optimiser drops their loads with their uses.
+#define MATERIAL_TEXEL(baked, k) (BAKES_MATERIALS ? baked(index) : LOAD4(TABLES, base + k))
 Material load_material(RenderConstants constants, uint index) {
     uint base = constants.materials + index * MATERIAL_TEXELS;
-    uvec4 a = LOAD4(TABLES, base);
-    uvec4 b = LOAD4(TABLES, base + 1u);
-    uvec4 c = LOAD4(TABLES, base + 2u);
-    uvec4 d = LOAD4(TABLES, base + 3u);
-    uvec4 e = LOAD4(TABLES, base + 4u);
-    uvec4 f = LOAD4(TABLES, base + 5u);
-    uvec4 g = LOAD4(TABLES, base + 6u);
-    uvec4 h = LOAD4(TABLES, base + 7u);
+    uvec4 a = MATERIAL_TEXEL(baked_material_0, 0u);
+    uvec4 b = MATERIAL_TEXEL(baked_material_1, 1u);
+    uvec4 c = MATERIAL_TEXEL(baked_material_2, 2u);
+    uvec4 d = MATERIAL_TEXEL(baked_material_3, 3u);
+    uvec4 e = MATERIAL_TEXEL(baked_material_4, 4u);
+    uvec4 f = MATERIAL_TEXEL(baked_material_5, 5u);
+    uvec4 g = MATERIAL_TEXEL(baked_material_6, 6u);
+    uvec4 h = MATERIAL_TEXEL(baked_material_7, 7u);
     Material m;
     m.base_color = uintBitsToFloat(a.xyz);
     m.kind_flags = a.w;
@@ -56,12 +58,13 @@ TextureHeader load_texture_header(RenderConstants constants, uint index) {
     return header;
 }
 
+#define LIGHT_TEXEL(baked, k) (BAKES_LIGHTS ? baked(index) : LOAD4(TABLES, base + k))
 Light load_light(RenderConstants constants, uint index) {
     uint base = constants.lights + index * LIGHT_TEXELS;
-    uvec4 a = LOAD4(TABLES, base);
-    uvec4 b = LOAD4(TABLES, base + 1u);
-    uvec4 c = LOAD4(TABLES, base + 2u);
-    uvec4 d = LOAD4(TABLES, base + 3u);
+    uvec4 a = LIGHT_TEXEL(baked_light_0, 0u);
+    uvec4 b = LIGHT_TEXEL(baked_light_1, 1u);
+    uvec4 c = LIGHT_TEXEL(baked_light_2, 2u);
+    uvec4 d = LIGHT_TEXEL(baked_light_3, 3u);
     Light light;
     light.kind = a.x;
     light.slot = a.y;
@@ -79,6 +82,34 @@ Light load_light(RenderConstants constants, uint index) {
 uint load_triangle_kind(RenderConstants constants, uint number) {
     if (HAS_ATTRIBUTES && constants.vertex_texels != 0u) return LOAD4(ATTRIBUTES, number).w;
     return LOAD1(ATTRIBUTES, number);
+}
+
+struct TriangleVertices {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+};
+
+// By the triangle's number: see LeafSlot in src/layout.rs.
+TriangleVertices load_triangle(uint number) {
+    uint base = (number >> 1u) * SLOT_TEXELS;
+    uvec4 q0 = LOAD4(SLOTS, base);
+    uvec4 q1 = LOAD4(SLOTS, base + 1u);
+    uvec4 q2 = LOAD4(SLOTS, base + 2u);
+    bool second = (number & 1u) != 0u;
+    uvec3 b = second ? uvec3(q1.zw, q2.x) : uvec3(q0.w, q1.xy);
+    uvec3 c = second ? q2.yzw : uvec3(q1.zw, q2.x);
+    return TriangleVertices(uintBitsToFloat(q0.xyz), uintBitsToFloat(b), uintBitsToFloat(c));
+}
+
+// The triangle with this number, which is the light with this index. Of one that is compiled in there are nine floats.
+TriangleVertices load_lamp(uint light, uint number) {
+    if (!BAKES_LIGHTS) return load_triangle(number);
+    uvec4 q0 = baked_lamp_0(light);
+    uvec4 q1 = baked_lamp_1(light);
+    uvec4 q2 = baked_lamp_2(light);
+    return TriangleVertices(uintBitsToFloat(q0.xyz), uintBitsToFloat(uvec3(q0.w, q1.xy)),
+                            uintBitsToFloat(uvec3(q1.zw, q2.x)));
 }
 
 // A 3×4 affine matrix as three rows.
@@ -118,7 +149,8 @@ TriangleLook triangle_look(RenderConstants constants, uint kind, uint instance) 
     uint index = kind & TRIANGLE_INDEX_MASK;
     if (!HAS_LIGHT(LIGHT_TRIANGLE) || (kind & TRIANGLE_LIGHT) == 0u) return TriangleLook(NONE, index);
     if (HAS_INSTANCES && instance != NONE) index += load_instance_header(constants, instance).y;
-    return TriangleLook(index, LOAD4(TABLES, constants.lights + index * LIGHT_TEXELS).w);
+    uvec4 light = BAKES_LIGHTS ? baked_light_0(index) : LOAD4(TABLES, constants.lights + index * LIGHT_TEXELS);
+    return TriangleLook(index, light.w);
 }
 
 #endif

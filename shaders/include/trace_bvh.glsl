@@ -6,6 +6,8 @@
 #include "alpha.glsl"
 #include "features.glsl"
 #include "records.glsl"
+#include "trace_baked.glsl"
+#include "watertight.glsl"
 
 const uint LIST_BITS = 7u;
 const uint LIST_MASK = (1u << LIST_BITS) - 1u;
@@ -15,8 +17,7 @@ const uint LEAVE_INSTANCE = 0xffffff80u;
 struct Trace {
     vec3 origin;  // the ray in the space of `instance`
     vec3 inverse_direction;
-    vec3 shear;   // and shear_axis: see visit_leaf
-    uint shear_axis;
+    RaySpace space;
     Hit hit;      // its barycentric weights times `determinant`
     float determinant;
     uint current;   // slot to visit, NONE when done
@@ -64,20 +65,10 @@ vec3 slab_inverse(vec3 d) {
     return vec3(d.x < 0.0 ? -1.0 : 1.0, d.y < 0.0 ? -1.0 : 1.0, d.z < 0.0 ? -1.0 : 1.0) / magnitude;
 }
 
-// v rotated so that component `axis` is the last.
-vec3 rotate_axis(vec3 v, uint axis) { return axis == 0u ? v.yzx : (axis == 1u ? v.zxy : v); }
-
 void set_ray(inout Trace trace, vec3 origin, vec3 direction) {
     trace.origin = origin;
     trace.inverse_direction = slab_inverse(direction);
-    vec3 magnitude = abs(direction);
-    bool x_largest = magnitude.x > magnitude.y && magnitude.x > magnitude.z;
-    trace.shear_axis = x_largest ? 0u : (magnitude.y > magnitude.z ? 1u : 2u);
-    vec3 d = rotate_axis(direction, trace.shear_axis);
-    precise float shear_z = 1.0 / d.z;
-    precise float shear_x = d.x * shear_z;
-    precise float shear_y = d.y * shear_z;
-    trace.shear = vec3(shear_x, shear_y, shear_z);
+    trace.space = ray_space(direction);
 }
 
 void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alpha_key) {
@@ -98,6 +89,11 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alph
     trace.world_origin = ray.origin;
     trace.world_direction = ray.direction;
     trace.alpha_key = alpha_key;
+    if (BAKES_GEOMETRY) {
+        // Done at once.
+        trace.current = NONE;
+        if (!ray.any_hit || trace_occluded(constants, ray)) trace.hit = trace_nearest(constants, ray);
+    }
 }
 
 bool trace_done(Trace trace) { return trace.current == NONE; }
@@ -172,7 +168,7 @@ void visit_inner(Trace trace, uvec4 q0, uvec4 q1, uvec4 q2, out uint next, out u
 // which are the weights of the vertices' sheared `depths` but for a factor.
 void visit_triangle(inout Trace trace, RenderConstants constants, uint number, vec3 edges, vec3 depths) {
     precise float determinant = edges.x + edges.y + edges.z;
-    precise float scaled_t = (edges.x * depths.x + edges.y * depths.y + edges.z * depths.z) * trace.shear.z;
+    precise float scaled_t = (edges.x * depths.x + edges.y * depths.y + edges.z * depths.z) * trace.space.shear.z;
     bool inside = all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)));
     float t = scaled_t / determinant;
     TriangleId triangle = TriangleId(number, trace.instance);
@@ -200,14 +196,14 @@ void visit_triangle(inout Trace trace, RenderConstants constants, uint number, v
 // the difference of the same products has the opposite sign exactly. Where d is a, the second has the edge functions e, 0
 // and −e, whose sum is zero.
 void visit_leaf(inout Trace trace, RenderConstants constants, uvec4 q0, uvec4 q1, uvec4 q2) {
-    precise vec3 a = rotate_axis(uintBitsToFloat(q0.xyz) - trace.origin, trace.shear_axis);
-    precise vec3 b = rotate_axis(uintBitsToFloat(uvec3(q0.w, q1.xy)) - trace.origin, trace.shear_axis);
-    precise vec3 c = rotate_axis(uintBitsToFloat(uvec3(q1.zw, q2.x)) - trace.origin, trace.shear_axis);
-    precise vec3 d = rotate_axis(uintBitsToFloat(q2.yzw) - trace.origin, trace.shear_axis);
-    precise vec2 pa = a.xy - trace.shear.xy * a.z;
-    precise vec2 pb = b.xy - trace.shear.xy * b.z;
-    precise vec2 pc = c.xy - trace.shear.xy * c.z;
-    precise vec2 pd = d.xy - trace.shear.xy * d.z;
+    precise vec3 a = rotate_axis(uintBitsToFloat(q0.xyz) - trace.origin, trace.space.axis);
+    precise vec3 b = rotate_axis(uintBitsToFloat(uvec3(q0.w, q1.xy)) - trace.origin, trace.space.axis);
+    precise vec3 c = rotate_axis(uintBitsToFloat(uvec3(q1.zw, q2.x)) - trace.origin, trace.space.axis);
+    precise vec3 d = rotate_axis(uintBitsToFloat(q2.yzw) - trace.origin, trace.space.axis);
+    precise vec2 pa = a.xy - trace.space.shear.xy * a.z;
+    precise vec2 pb = b.xy - trace.space.shear.xy * b.z;
+    precise vec2 pc = c.xy - trace.space.shear.xy * c.z;
+    precise vec2 pd = d.xy - trace.space.shear.xy * d.z;
     precise float bc = pc.x * pb.y - pc.y * pb.x;
     precise float ca = pa.x * pc.y - pa.y * pc.x;
     precise float ab = pb.x * pa.y - pb.y * pa.x;

@@ -45,6 +45,10 @@ pub(crate) struct EstimatorArgs {
     /// cones that are a quarter of a pixel wide and widen at each scattering event.
     #[arg(long, help_heading = "Light transport")]
     no_mip: bool,
+    /// Compile nothing of the scene into the kernel; without it, on CPU devices, small scenes and small tables of materials
+    /// and lights are.
+    #[arg(long, help_heading = "Device")]
+    no_bake: bool,
 
     /// Image of the environment (.hdr or .exr, latitude/longitude), in place of the scene's.
     #[arg(long, value_name = "FILE", help_heading = "Environment")]
@@ -130,6 +134,9 @@ impl EstimatorArgs {
         if self.no_mip {
             flags.push(String::from("--no-mip"));
         }
+        if self.no_bake {
+            flags.push(String::from("--no-bake"));
+        }
         flags
     }
 
@@ -150,6 +157,7 @@ impl EstimatorArgs {
         settings.mis_heuristic = self.mis;
         settings.env_sampling = self.env_sampling;
         settings.mip = !self.no_mip;
+        settings.bake = !self.no_bake;
         settings.clamp_indirect = self.clamp_indirect;
         settings.trace = self.trace;
         settings.bvh_quality = self.bvh_quality;

@@ -6,8 +6,9 @@ use clap::Args;
 use serde_json::{Value, json};
 use sunfleck::scene::{AlphaMode, Bsdf, Environment, Lobe, Material, Projection, PunctualKind, Scene, load};
 
+use sunfleck::gpu::{DeviceKind, TraceBackend};
 use sunfleck::prepare::Prepared;
-use sunfleck::render::{BvhQuality, Settings, prepare_scene};
+use sunfleck::render::{Bake, BakeReport, BvhQuality, Settings, prepare_scene};
 
 use super::{devices, parse, print_json, print_warnings};
 
@@ -228,6 +229,7 @@ fn describe_prepared(prepared: &Prepared) -> Value {
         "gpu_bytes_by_array": arrays,
         "kept": prepared.features.kept(),
         "dropped": prepared.features.dropped(),
+        "baked_on_cpu": baked_on_cpu(prepared),
     })
 }
 
@@ -235,6 +237,11 @@ fn describe_prepared(prepared: &Prepared) -> Value {
 fn bytes_per_triangle(prepared: &Prepared) -> Option<f64> {
     let s = &prepared.statistics;
     (s.triangles > 0).then(|| (s.array_bytes[0] + s.array_bytes[1]) as f64 / s.triangles as f64)
+}
+
+/// What a software device has compiled into its kernel.
+fn baked_on_cpu(prepared: &Prepared) -> BakeReport {
+    Bake::choose(prepared, DeviceKind::Cpu, TraceBackend::Bvh, true).planned()
 }
 
 fn print_prepared(prepared: &Prepared) {
@@ -259,6 +266,7 @@ fn print_prepared(prepared: &Prepared) {
     );
     eprintln!("  kernel needs {}", prepared.features.kept().join(", "));
     eprintln!("  left out     {}", prepared.features.dropped().join(", "));
+    eprintln!("  compiled in  {}, on CPU devices", baked_on_cpu(prepared));
 }
 
 fn print_for_people(scene: &Scene) {

@@ -181,6 +181,7 @@ mod tests {
             trace: "bvh".to_owned(),
             kernel_key: "key".to_owned(),
             light_choice: sunfleck::render::LightChoice::Power,
+            baked: sunfleck::render::BakeReport::default(),
             features: vec!["mis".to_owned()],
             rays: 100,
             paths: 8,

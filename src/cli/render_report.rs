@@ -23,6 +23,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "trace": result.trace,
         "kernel_key": result.kernel_key,
         "features": result.features,
+        "baked": result.baked,
         "width": result.film.width(),
         "height": result.film.height(),
         "spp": result.film.mean_samples_per_pixel(),

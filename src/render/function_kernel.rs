@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use ash::vk::BufferUsageFlags as Usage;
 
+use super::bake::Bake;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
 use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Dispatch, Gpu, Kernel, KernelDescription, MemoryUse, Submission, TraceBackend,
@@ -28,6 +29,8 @@ pub struct FunctionCall<'a> {
     pub constants: RenderConstants,
     /// Specialisation constants, as in shaders/include/features.glsl; missing ones keep "everything on".
     pub specialization: &'a [(u32, u32)],
+    /// What is compiled in of the scene.
+    pub bake: &'a Bake,
     /// Further macro definitions.
     pub defines: &'a [(&'a str, String)],
 }
@@ -42,7 +45,7 @@ impl FunctionCall<'_> {
         let lengths: Vec<usize> = self.prepared.arrays.iter().map(Vec::len).collect();
         let form = choose_array_form(&gpu.info, &lengths)?;
         let buffers = SceneBuffers::upload(gpu, self.prepared, self.trace, form)?;
-        let spirv = self.compile(form.0)?;
+        let (spirv, baked) = self.bake.apply(self.compile(form.0)?);
         let constants = Buffer::with_data(gpu, "constants", &[self.constants], Usage::UNIFORM_BUFFER)?;
         let input = Buffer::with_data(gpu, "inputs", inputs, Usage::STORAGE_BUFFER)?;
         let count = lanes as usize * outputs_per_lane as usize;
@@ -56,7 +59,7 @@ impl FunctionCall<'_> {
             array_binding,
         ];
         set.extend(buffers.acceleration.as_ref().map(BindingResource::AccelerationStructure));
-        let mut specialization = vec![(1, form.1)];
+        let mut specialization = vec![(1, form.1), (12, baked.parts)];
         specialization.extend_from_slice(self.specialization);
         let kernel = Kernel::new(
             gpu,

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::bake::Baked;
 use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings};
 use crate::gpu::{ArrayForm, TraceBackend};
 use crate::prepare::{EnvironmentKind, Features, LightChoice, Prepared};
@@ -39,6 +40,8 @@ pub struct KernelKey {
     pub sampler: SamplerKind,
     /// Its points are those of independent replicates, by which the error is estimated.
     pub replicates: bool,
+    /// What is compiled in.
+    pub baked: Baked,
     /// How environment directions are drawn.
     pub env_sampling: EnvironmentSampling,
 }
@@ -67,6 +70,7 @@ impl KernelKey {
             mis_heuristic: settings.mis_heuristic,
             sampler: settings.sampler,
             replicates: settings.sampler == SamplerKind::Sobol && settings.estimates_error(),
+            baked: Baked::default(),
             env_sampling: settings.env_sampling,
         }
     }
@@ -114,6 +118,7 @@ impl KernelKey {
             (9, self.stack_size),
             (10, self.sampler as u32 + u32::from(self.replicates)),
             (11, u32::from(f.light_choice == LightChoice::Bvh)),
+            (12, self.baked.parts),
         ]
     }
 }
@@ -136,6 +141,9 @@ impl fmt::Display for KernelKey {
         }
         if self.lens {
             f.write_str(" lens")?;
+        }
+        if self.baked.parts != 0 {
+            write!(f, " baked:{:016x}", self.baked.hash)?;
         }
         if self.orthographic {
             f.write_str(" orthographic")?;

@@ -1,5 +1,6 @@
 //! Rendering: what is asked for ([`Settings`]), how it goes on ([`ProgressUpdate`]) and what comes out ([`RenderResult`]).
 
+mod bake;
 mod function_kernel;
 mod kernel_key;
 mod looks;
@@ -16,6 +17,7 @@ mod slices;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+pub use bake::{Bake, BakeReport, Baked, MOST_BAKED_RECORDS, MOST_BAKED_TRIANGLES};
 pub use function_kernel::FunctionCall;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};
@@ -122,6 +124,7 @@ pub fn render_on(
         trace: open.trace.to_string(),
         kernel_key: key.to_string(),
         light_choice: key.features.light_choice,
+        baked: tracer.bake_report().clone(),
         features: key.features.kept().into_iter().map(str::to_owned).collect(),
         rays: run.rays,
         paths: run.paths,

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use ash::vk::BufferUsageFlags as Usage;
 
+use super::bake::{Bake, BakeReport};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
@@ -47,6 +48,7 @@ pub struct PathTracer {
     slices: Vec<Slice>,
     buffers: SceneBuffers,
     overrides: BindingOverride,
+    bake: BakeReport,
     /// Seconds that compiling and uploading took.
     pub compile_seconds: f64,
     /// See `compile_seconds`.
@@ -89,8 +91,11 @@ impl PathTracer {
         let mut slices = slices?;
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let key = KernelKey::new(prepared, camera, settings, trace, form);
-        let kernel = build_kernel(gpu, &key, settings, overrides, &buffers, &constants_buffer, &slices)?;
+        let mut key = KernelKey::new(prepared, camera, settings, trace, form);
+        let bake = Bake::choose(prepared, gpu.info.kind, trace, settings.bake && !overrides.driver_specializes);
+        let spirv;
+        (spirv, key.baked) = bake.apply(kernel_spirv(&key, settings)?);
+        let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
@@ -101,6 +106,7 @@ impl PathTracer {
             slices,
             buffers,
             overrides,
+            bake: bake.report(key.baked),
             compile_seconds,
             upload_seconds,
         })
@@ -109,6 +115,11 @@ impl PathTracer {
     /// What the kernel was built with.
     pub fn key(&self) -> &KernelKey {
         &self.key
+    }
+
+    /// What of the scene is compiled in.
+    pub fn bake_report(&self) -> &BakeReport {
+        &self.bake
     }
 
     /// Bytes of device memory in use.
@@ -238,13 +249,12 @@ fn effective_max_bounces(settings: &Settings) -> u32 {
 fn build_kernel(
     gpu: &Arc<Gpu>,
     key: &KernelKey,
-    settings: &Settings,
+    spirv: &[u32],
     overrides: BindingOverride,
     buffers: &SceneBuffers,
     constants: &Buffer,
     slices: &[Slice],
 ) -> Result<Kernel> {
-    let spirv = kernel_spirv(key, settings)?;
     let arrays = buffers.bindings();
     let array_binding = array_binding(buffers, key.array_form, &arrays);
     let sets: Vec<Vec<BindingResource<'_>>> = slices
@@ -266,7 +276,7 @@ fn build_kernel(
         gpu,
         &KernelDescription {
             name: "path_trace",
-            spirv: &spirv,
+            spirv,
             workgroup_size,
             constants: &key.specialization(),
             driver_specializes: overrides.driver_specializes,

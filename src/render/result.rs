@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::BakeReport;
 use crate::film::Film;
 use crate::film::replicates::{ErrorEstimate, RobustMean};
 use crate::prepare::LightChoice;
@@ -25,6 +26,8 @@ pub struct RenderResult {
     pub kernel_key: String,
     /// What the kernel was built with, one name each.
     pub features: Vec<String>,
+    /// What of the scene was compiled in.
+    pub baked: BakeReport,
     /// How lights were picked: what the settings ask for, unless the scene has too few.
     pub light_choice: LightChoice,
     /// Rays traced, shadow rays included.

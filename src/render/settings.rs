@@ -54,6 +54,8 @@ pub struct Settings {
     pub mip: bool,
     /// How good the trees of our own BVH are.
     pub bvh_quality: BvhQuality,
+    /// Compile small scenes into the kernel on software devices.
+    pub bake: bool,
     /// Which implementation traces rays.
     pub trace: TraceChoice,
     /// Which device renders.
@@ -88,6 +90,7 @@ impl Default for Settings {
             filter: PixelFilter::default(),
             mip: true,
             bvh_quality: BvhQuality::default(),
+            bake: true,
             trace: TraceChoice::default(),
             device: DeviceChoice::default(),
             shaders_dir: None,

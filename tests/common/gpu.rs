@@ -1,7 +1,8 @@
 //! The GPU fixture: one device a test binary, the driver and back end from the environment, and no validation message
 //! goes unnoticed.
 //!
-//! `SUNFLECK_TEST_TRACE` (`bvh` or `ray-query`) chooses the back end; the driver is the one that the loader finds (see
+//! `SUNFLECK_TEST_TRACE` (`bvh` or `ray-query`) chooses the back end, `SUNFLECK_TEST_NO_BAKE=1` leaves small scenes out of
+//! the kernel; the driver is the one that the loader finds (see
 //! scripts/with-driver.sh).
 
 use std::ops::ControlFlow;
@@ -13,7 +14,8 @@ use sunfleck::gpu::{Gpu, TraceBackend, take_validation_messages, validation_is_a
 use sunfleck::layout::RenderConstants;
 use sunfleck::prepare::{Prepared, camera_constants};
 use sunfleck::render::{
-    BindingOverride, FunctionCall, PathTracer, Run, SamplerKind, Settings, TraceChoice, open_device, prepare_scene,
+    Bake, BindingOverride, FunctionCall, PathTracer, Run, SamplerKind, Settings, TraceChoice, open_device,
+    prepare_scene,
 };
 use sunfleck::scene::{Scene, builtin};
 
@@ -56,7 +58,8 @@ fn shaders_dir() -> Option<PathBuf> {
 /// Small default settings for tests, with independent samples: most tests take the variance of a mean from them.
 pub fn settings(width: u32, height: u32) -> Settings {
     let sampler = SamplerKind::Independent;
-    Settings { width, height, sampler, shaders_dir: shaders_dir(), ..Settings::default() }
+    let bake = std::env::var_os("SUNFLECK_TEST_NO_BAKE").is_none();
+    Settings { width, height, sampler, bake, shaders_dir: shaders_dir(), ..Settings::default() }
 }
 
 /// A scene on the device under test.
@@ -133,6 +136,7 @@ pub fn call_with_scene(
         prepared: &prepared,
         constants,
         specialization,
+        bake: &Bake::default(),
         defines: &[],
     };
     let outputs = call.run(&device.gpu, inputs, lanes, outputs_per_lane).expect("the kernel runs");

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 use sunfleck::gpu::TraceBackend;
 use sunfleck::layout::RenderConstants;
 use sunfleck::prepare::Prepared;
-use sunfleck::render::{FunctionCall, LightChoice, Settings};
+use sunfleck::render::{Bake, FunctionCall, LightChoice, Settings};
 use sunfleck::scene::{Camera, Projection, Scene, builtin};
 
 use super::gpu;
@@ -19,6 +19,8 @@ pub struct TestKernel {
     pub constants: RenderConstants,
     /// The back end; only kernels that trace need the one under test.
     pub trace: TraceBackend,
+    /// What is compiled in of the scene: nothing, unless a test adds it.
+    pub bake: Bake,
     specialization: Vec<(u32, u32)>,
     defines: Vec<(&'static str, String)>,
 }
@@ -43,6 +45,7 @@ impl TestKernel {
             prepared,
             constants,
             trace: TraceBackend::Bvh,
+            bake: Bake::default(),
             specialization: vec![(11, by_bvh.into())],
             defines: Vec::new(),
         }
@@ -71,6 +74,7 @@ impl TestKernel {
             prepared: &self.prepared,
             constants: self.constants,
             specialization: &self.specialization,
+            bake: &self.bake,
             defines: &self.defines,
         };
         let lanes = u32::try_from(lanes).expect("fewer lanes");

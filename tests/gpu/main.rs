@@ -7,6 +7,7 @@ mod agreement;
 mod alpha;
 mod anisotropy;
 mod attributes;
+mod baked;
 mod bitterli;
 mod bsdf_chi_square;
 mod bsdf_delta;

@@ -94,6 +94,19 @@ mutations! {
     unturned_edge: "include/trace_bvh.glsl",
         "vec3(cd, da, -ca)" => "vec3(cd, da, ca)",
         caught by "watertight::closed_meshes_are_watertight";
+    /// The triangle that a ray starts on is not left out of the baked search.
+    baked_start_is_met: "include/trace_baked.glsl",
+        "constants.zero, b.grazing,\n                                ray.from.slot" =>
+        "constants.zero, b.grazing,\n                                NONE",
+        caught by "baked::hits_agree_with_brute_force";
+    /// The rows of ray space go by the wrong axis.
+    baked_rows_swapped: "include/trace_baked.glsl",
+        "space.axis == 1u ? vec3(0.0, x, 1.0)" => "space.axis == 1u ? vec3(1.0, x, 0.0)",
+        caught by "baked::closed_meshes_are_watertight";
+    /// The lights of a baked scene all count as the first.
+    baked_light_mistaken: "include/light.glsl",
+        "uint index = baked_light_search(x);" => "uint index = 0u;",
+        caught by "baked::images_are_those_without";
     /// Boxes that are narrower than what rounding leaves of a ray.
     shrunken_boxes: "include/trace_bvh.glsl",
         "(16.0 * UNIT_ROUNDOFF)" => "(-16.0 * UNIT_ROUNDOFF)",

@@ -21,7 +21,7 @@ pub(super) struct Emitter<'a> {
     pub(super) words: Vec<u32>,
 }
 
-fn head(opcode: u16, len: usize) -> u32 {
+pub(super) fn head(opcode: u16, len: usize) -> u32 {
     (u32::try_from(len).unwrap_or(u32::MAX) << 16) | u32::from(opcode)
 }
 

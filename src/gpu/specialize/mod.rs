@@ -5,14 +5,20 @@
 //! It works on plain words with a small table of instructions; what is not in the table is left alone and taken to
 //! use every id that it could mention. A module that cannot be understood is not touched.
 
+mod bake;
+mod code;
 mod constants;
 mod control_flow;
 mod emit;
+mod faces;
 mod fold;
 mod instruction;
 mod module;
 mod propagate;
 mod uses;
+
+pub use bake::{BakedScene, BakedTable, bake};
+pub use faces::BakedTriangle;
 
 use constants::Constants;
 use control_flow::{ControlFlow, Exit};

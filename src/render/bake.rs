@@ -1,0 +1,200 @@
+//! What of a scene is compiled into the kernel: a rule of scene and device.
+
+use std::hash::{Hash, Hasher};
+
+use crate::gpu::specialize::{BakedScene, BakedTable, BakedTriangle, bake};
+use crate::gpu::{DeviceKind, TraceBackend};
+use crate::layout::{LIGHT_TEXELS, LIGHT_TRIANGLE, Light, MATERIAL_TEXELS, NONE, SceneArray, Texel};
+use crate::prepare::{LightChoice, Prepared};
+
+/// Most triangles that are compiled in (docs/benchmarks).
+pub const MOST_BAKED_TRIANGLES: u64 = 128;
+/// Most materials, and most lights, likewise.
+pub const MOST_BAKED_RECORDS: usize = 16;
+
+const GEOMETRY: u32 = 1;
+const MATERIALS: u32 = 2;
+const LIGHTS: u32 = 4;
+
+/// The part of the kernel key.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Baked {
+    /// Specialisation constant BAKED of shaders/include/features.glsl.
+    pub parts: u32,
+    /// Hash of what is compiled in.
+    pub hash: u64,
+}
+
+/// What of a scene is compiled into a kernel.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct BakeReport {
+    /// `geometry`, `materials`, `lights`.
+    pub parts: Vec<&'static str>,
+    /// Why geometry is or is not among them.
+    pub reason: String,
+}
+
+impl std::fmt::Display for BakeReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let parts = if self.parts.is_empty() { String::from("nothing") } else { self.parts.join(", ") };
+        write!(f, "{parts} (geometry: {})", self.reason)
+    }
+}
+
+/// What is compiled in, and why, or why not.
+#[derive(Clone, Debug, Default)]
+pub struct Bake {
+    scene: BakedScene,
+    parts: u32,
+    /// Why geometry is or is not compiled in.
+    pub reason: String,
+}
+
+impl Bake {
+    /// Chooses for a scene on a device; `wanted` is false for `--no-bake`.
+    pub fn choose(prepared: &Prepared, device: DeviceKind, trace: TraceBackend, wanted: bool) -> Self {
+        if !wanted {
+            return Self { reason: String::from("--no-bake"), ..Self::default() };
+        }
+        if device != DeviceKind::Cpu {
+            return Self { reason: String::from("the device is no CPU"), ..Self::default() };
+        }
+        let mut this = Self::default();
+        match geometry_refused(prepared, trace) {
+            Some(reason) => this.reason = reason,
+            None => {
+                let count = prepared.statistics.triangles;
+                this.reason = format!("{count} triangles, at most {MOST_BAKED_TRIANGLES}");
+                this.add_geometry(prepared);
+            }
+        }
+        this.add_materials(prepared);
+        this.add_lights(prepared);
+        this
+    }
+
+    /// Compiles in all that can be, whatever the rule says of geometry.
+    pub fn add_all(&mut self, prepared: &Prepared) {
+        self.add_geometry(prepared);
+        self.add_materials(prepared);
+        self.add_lights(prepared);
+    }
+
+    /// A kernel with the scene compiled in, and what of it that is. A kernel that lacks the functions for it, as one of
+    /// `--shaders` may, stays as it is.
+    pub fn apply(&self, spirv: Vec<u32>) -> (Vec<u32>, Baked) {
+        if self.parts == 0 {
+            return (spirv, Baked::default());
+        }
+        match bake(&spirv, &self.scene) {
+            Some(words) => (words, Baked { parts: self.parts, hash: fingerprint(&self.scene) }),
+            None => (spirv, Baked::default()),
+        }
+    }
+
+    /// What is compiled in, for people and programs.
+    pub fn report(&self, baked: Baked) -> BakeReport {
+        let names = [(GEOMETRY, "geometry"), (MATERIALS, "materials"), (LIGHTS, "lights")];
+        let parts = names.into_iter().filter(|(bit, _)| baked.parts & bit != 0).map(|(_, name)| name).collect();
+        BakeReport { parts, reason: self.reason.clone() }
+    }
+
+    /// What the rule would compile in: [`Bake::apply`] may find that a shader lacks the functions for it.
+    pub fn planned(&self) -> BakeReport {
+        self.report(Baked { parts: self.parts, hash: 0 })
+    }
+
+    /// Whether geometry is compiled in.
+    pub fn has_geometry(&self) -> bool {
+        self.parts & GEOMETRY != 0
+    }
+
+    /// Compiles in the geometry, whatever the rule says.
+    pub fn add_geometry(&mut self, prepared: &Prepared) {
+        self.scene.triangles = triangles(prepared);
+        self.scene.lamps_only = prepared.features.lights == 1 << LIGHT_TRIANGLE;
+        self.parts |= GEOMETRY;
+    }
+
+    fn add_materials(&mut self, prepared: &Prepared) {
+        let start = prepared.constants.materials;
+        let records = records(prepared, start, prepared.constants.textures, MATERIAL_TEXELS);
+        if (1..=MOST_BAKED_RECORDS).contains(&records.len()) {
+            self.scene.tables.push(BakedTable { name: "baked_material", records });
+            self.parts |= MATERIALS;
+        }
+    }
+
+    fn add_lights(&mut self, prepared: &Prepared) {
+        let (start, count) = (prepared.constants.lights, prepared.constants.light_count);
+        if !(1..=MOST_BAKED_RECORDS as u32).contains(&count) {
+            return;
+        }
+        let lights = records(prepared, start, start + count * LIGHT_TEXELS, LIGHT_TEXELS);
+        let lamps = lights.iter().map(|light| {
+            let light: Light = bytemuck::cast([light[0], light[1], light[2], light[3]]);
+            let is_triangle = light.kind == LIGHT_TRIANGLE && light.slot != NONE;
+            let vertices = is_triangle.then(|| prepared.triangle(light.slot).vertices);
+            let mut texels = [[0_u32; 4]; 3];
+            let floats = vertices.unwrap_or_default();
+            texels.as_flattened_mut().iter_mut().zip(floats.as_flattened()).for_each(|(word, x)| *word = x.to_bits());
+            texels.to_vec()
+        });
+        let lamps = BakedTable { name: "baked_lamp", records: lamps.collect() };
+        self.scene.tables.extend([BakedTable { name: "baked_light", records: lights }, lamps]);
+        if prepared.features.light_choice != LightChoice::Bvh {
+            let tables: &[u32] = bytemuck::cast_slice(&prepared.arrays[SceneArray::Tables as usize]);
+            let words = &tables[prepared.constants.light_cdf_word as usize..][..=count as usize];
+            let record = |&word: &u32| vec![[word, 0, 0, 0]];
+            self.scene.tables.push(BakedTable { name: "baked_light_cdf", records: words.iter().map(record).collect() });
+            self.scene.light_cdf = words.to_vec();
+        }
+        self.parts |= LIGHTS;
+    }
+}
+
+/// Why the rule leaves geometry out, if it does.
+fn geometry_refused(prepared: &Prepared, trace: TraceBackend) -> Option<String> {
+    let count = prepared.statistics.triangles;
+    let features = &prepared.features;
+    if trace != TraceBackend::Bvh {
+        Some(String::from("the device traces the rays"))
+    } else if features.instances || features.alpha || features.panes {
+        Some(String::from("there are instances, alpha or panes"))
+    } else if count == 0 || count > MOST_BAKED_TRIANGLES {
+        Some(format!("{count} triangles, not 1 to {MOST_BAKED_TRIANGLES}"))
+    } else {
+        None
+    }
+}
+
+/// The records of a table between two texels.
+fn records(prepared: &Prepared, start: u32, end: u32, texels: u32) -> Vec<Vec<Texel>> {
+    let table = &prepared.arrays[SceneArray::Tables as usize][start as usize..end as usize];
+    table.chunks_exact(texels as usize).map(<[Texel]>::to_vec).collect()
+}
+
+/// Every triangle of the scene, by its number.
+fn triangles(prepared: &Prepared) -> Vec<BakedTriangle> {
+    let numbers = prepared.meshes.iter().flat_map(|mesh| prepared.triangle_slots(mesh));
+    numbers.map(|number| BakedTriangle { number, vertices: prepared.triangle(number).vertices }).collect()
+}
+
+/// FNV-1a (Fowler, Noll, Vo), which is the same in every build.
+struct Fnv(u64);
+
+impl Hasher for Fnv {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        self.0 = bytes.iter().fold(self.0, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+    }
+}
+
+fn fingerprint(scene: &BakedScene) -> u64 {
+    let mut hasher = Fnv(0xcbf2_9ce4_8422_2325);
+    scene.hash(&mut hasher);
+    hasher.finish()
+}

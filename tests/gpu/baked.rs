@@ -1,0 +1,202 @@
+//! Scenes that are compiled into the kernel: the search finds what a loop over all triangles finds, closed meshes stay
+//! closed, images are the same, and what is not compiled in is said.
+
+use crate::common::brute_force::{check, world_triangles};
+use crate::common::gpu;
+use crate::common::kernel::{Random, TestKernel};
+use crate::common::scenes::scene;
+use crate::common::spirv::{assert_valid, bytes, validator_is_there, words};
+use crate::common::trace::{NO_TRIANGLE, Ray, cube, icosphere, kernel, rays_at_edges, scene_of, soup, trace};
+use glam::{DAffine3, DVec3};
+use sunfleck::gpu::specialize::{bake, specialize};
+use sunfleck::gpu::{DeviceKind, TraceBackend, embedded};
+use sunfleck::render::{Bake, BindingOverride, KernelKey, Settings, prepare_scene};
+use sunfleck::scene::{Primitive, Scene};
+
+/// A kernel that traces by the baked search, however many triangles there are.
+fn baked(scene: &Scene) -> TestKernel {
+    let mut kernel = kernel(scene);
+    kernel.trace = TraceBackend::Bvh;
+    kernel.bake.add_geometry(&kernel.prepared);
+    kernel
+}
+
+fn one(mesh: Primitive) -> Scene {
+    scene_of(vec![(mesh, vec![DAffine3::IDENTITY])])
+}
+
+fn random_rays(count: usize, origin: DVec3) -> Vec<Ray> {
+    let mut random = Random(31);
+    let mut ray = |i: usize| {
+        let mut direction = random.direction();
+        if i.is_multiple_of(7) {
+            direction.x = 0.0;
+        }
+        if i.is_multiple_of(21) {
+            direction = DVec3::Y * direction.y.signum();
+        }
+        Ray::new(random.point(3.0) - origin, direction * 10.0_f64.powf(random.between(-3.0, 3.0)))
+    };
+    (0..count).map(&mut ray).collect()
+}
+
+#[test]
+fn hits_agree_with_brute_force() {
+    let cases = [soup(&mut Random(30), 40), cube(2), icosphere(1)];
+    for mesh in cases {
+        let kernel = baked(&one(mesh));
+        let triangles = world_triangles(&kernel);
+        let rays = random_rays(4096, kernel.prepared.origin);
+        let hits = trace(&kernel, &rays);
+        rays.iter().zip(&hits).for_each(|(ray, hit)| check(&triangles, ray, hit));
+        assert!(hits.iter().filter(|hit| hit.triangle != NO_TRIANGLE).count() > rays.len() / 64);
+        // The same with the nearest triangle left out at the start or at the end, or with an end before or behind it.
+        let mut again = rays.clone();
+        for (i, (ray, hit)) in again.iter_mut().zip(&hits).enumerate() {
+            match i % 5 {
+                0 => ray.from = hit.triangle,
+                1 => (ray.towards, ray.t_max) = (hit.triangle, (hit.t as f32).next_up()),
+                2 => ray.t_max = (hit.t * 0.99) as f32,
+                3 => (ray.t_max, ray.any_hit) = ((hit.t * 1.01) as f32, true),
+                _ => (ray.from, ray.any_hit) = (hit.triangle, true),
+            }
+        }
+        let second = trace(&kernel, &again);
+        again.iter().zip(&second).for_each(|(ray, hit)| check(&triangles, ray, hit));
+        for ((ray, first), second) in again.iter().zip(&hits).zip(&second).filter(|(t, _)| t.1.triangle != NO_TRIANGLE)
+        {
+            let excluded = ray.from == first.triangle || ray.towards == first.triangle || ray.t_max < first.t as f32;
+            assert!(!(first.triangle == second.triangle && excluded), "{ray:?}: {second:?}");
+        }
+    }
+}
+
+#[test]
+fn closed_meshes_are_watertight() {
+    const RAYS: usize = 1 << 18;
+    let far = DAffine3::from_translation(DVec3::new(3.0, -2.0, 500.0));
+    let turned = DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    let cases = [
+        (icosphere(1), DAffine3::IDENTITY),
+        (icosphere(1), far),
+        (cube(2), DAffine3::IDENTITY),
+        (cube(1), turned),
+        (cube(1), far * turned),
+    ];
+    for (mesh, place) in cases {
+        let kernel = baked(&scene_of(vec![(mesh.clone(), vec![place])]));
+        let mut rays = rays_at_edges(&mesh, &place, kernel.prepared.origin, RAYS);
+        rays.iter_mut().skip(RAYS / 2).for_each(|ray| ray.any_hit = true);
+        let hits = trace(&kernel, &rays);
+        let leaks: Vec<&Ray> =
+            rays.iter().zip(&hits).filter(|(_, hit)| hit.triangle == NO_TRIANGLE).map(|(ray, _)| ray).collect();
+        assert!(leaks.is_empty(), "{} of {RAYS} rays leave {place:?}: {:?}", leaks.len(), leaks[0]);
+    }
+}
+
+/// Rays along an axis that meet vertices, edges and diagonals exactly: their edge functions are zeros of either sign.
+#[test]
+fn axis_parallel_rays_do_not_leak() {
+    let kernel = baked(&one(cube(3)));
+    let grid = |i: usize| [i % 11, i / 11 % 11, i / 121].map(|k| (k as f64 - 5.0) / 6.0);
+    let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+    let from = |i| DVec3::from(grid(i)) - kernel.prepared.origin;
+    let mut rays: Vec<Ray> = (0..11 * 11 * 11).flat_map(|i| axes.map(|axis| Ray::new(from(i), axis))).collect();
+    let any: Vec<Ray> = rays.iter().map(|ray| Ray { any_hit: true, ..*ray }).collect();
+    rays.extend(any);
+    for (ray, hit) in rays.iter().zip(trace(&kernel, &rays)) {
+        assert!(hit.triangle != NO_TRIANGLE, "{ray:?} leaks");
+        let end = (ray.origin + ray.direction * hit.t + kernel.prepared.origin).dot(ray.direction);
+        assert!((end - 1.0).abs() < 1e-6, "{ray:?} ends at {end}");
+    }
+}
+
+#[test]
+fn invalid_rays_hit_nothing() {
+    let kernel = baked(&one(icosphere(1)));
+    let good = Ray::new(-kernel.prepared.origin, DVec3::new(0.3, 0.5, 0.7));
+    let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(DVec3::splat);
+    let mut rays: Vec<Ray> = bad.iter().map(|&origin| Ray { origin, ..good }).collect();
+    rays.extend(bad.iter().map(|&direction| Ray { direction, ..good }));
+    rays.extend([DVec3::ZERO, DVec3::splat(-0.0)].map(|direction| Ray { direction, ..good }));
+    rays.extend([0.0, -1.0].map(|t_max| Ray { t_max, ..good }));
+    let any: Vec<Ray> = rays.iter().map(|ray| Ray { any_hit: true, ..*ray }).collect();
+    rays.extend(any);
+    for (ray, hit) in rays.iter().zip(trace(&kernel, &rays)) {
+        assert_eq!(hit.triangle, NO_TRIANGLE, "{ray:?}");
+    }
+    assert_ne!(trace(&kernel, &[good])[0].triangle, NO_TRIANGLE);
+}
+
+/// The same seed gives the same image with and without what is compiled in: only a path whose hit is rounded across an edge
+/// may go another way.
+#[test]
+fn images_are_those_without() {
+    if gpu::device().gpu.info.kind != DeviceKind::Cpu {
+        return;
+    }
+    for name in ["cornell", "metallic_roughness", "instances"] {
+        let scene = scene(name);
+        let draw = |bake: bool| {
+            let settings = Settings { max_bounces: Some(4), bake, ..gpu::settings(64, 64) };
+            let mut tracer = gpu::path_tracer_on(TraceBackend::Bvh, &scene, &settings, BindingOverride::default());
+            assert_eq!(tracer.key().baked.parts != 0, bake, "{name}");
+            gpu::run(&mut tracer, 5, 1).film.radiance()
+        };
+        let (with, without) = (draw(true), draw(false));
+        let differs = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-3 * a[c].max(b[c]));
+        let different = with.iter().zip(&without).filter(|(a, b)| differs((a, b))).count();
+        println!("{name}: {different} of {} pixels differ", with.len());
+        assert!(different * 200 < with.len(), "{name}: {different} of {} pixels differ", with.len());
+        assert!(with.iter().flatten().any(|c| *c > 0.0), "{name} is black");
+    }
+}
+
+/// The kernel of a scene is the same every time, valid, and its specialisation too.
+#[test]
+fn kernels_are_valid_and_always_the_same() {
+    let scene = scene("cornell");
+    let (camera, settings) = (&scene.cameras[0], gpu::settings(16, 16));
+    let prepared = prepare_scene(&scene, camera, &settings).expect("the scene fits");
+    for spirv in embedded::PATH_TRACE[TraceBackend::Bvh as usize] {
+        let make = || {
+            let mut all = Bake::default();
+            all.add_all(&prepared);
+            all.apply(words(spirv))
+        };
+        let ((first, key), (second, other_key)) = (make(), make());
+        assert_eq!(key.parts, 7);
+        assert_eq!((&first, key), (&second, other_key));
+        let form = sunfleck::gpu::ArrayForm::TexelBuffer;
+        let mut kernel_key = KernelKey::new(&prepared, camera, &settings, TraceBackend::Bvh, (form, 31));
+        kernel_key.baked = key;
+        let values: Vec<_> = kernel_key.specialization().into_iter().chain([(0, 64)]).collect();
+        let specialized = specialize(&first, &values).expect("understood");
+        if validator_is_there() {
+            assert_valid("baked", &bytes(&first));
+            assert_valid("baked and specialised", &bytes(&specialized));
+        }
+    }
+    assert_eq!(bake(&[1, 2, 3], &sunfleck::gpu::specialize::BakedScene::default()), None);
+}
+
+/// What the rule says.
+#[test]
+fn the_rule_says_why() {
+    let info = &gpu::device().gpu.info;
+    let prepare = |name| {
+        let scene = scene(name);
+        prepare_scene(&scene, &scene.cameras[0], &gpu::settings(16, 16)).expect("the scene fits")
+    };
+    let choose = |prepared: &_, trace, wanted| Bake::choose(prepared, info.kind, trace, wanted);
+    let cornell = prepare("cornell");
+    assert_eq!(choose(&cornell, TraceBackend::Bvh, false).reason, "--no-bake");
+    if info.kind != DeviceKind::Cpu {
+        assert_eq!(choose(&cornell, TraceBackend::Bvh, true).reason, "the device is no CPU");
+        return;
+    }
+    assert!(choose(&cornell, TraceBackend::Bvh, true).has_geometry());
+    assert!(!choose(&cornell, TraceBackend::RayQuery, true).has_geometry());
+    let instances = choose(&prepare("instances"), TraceBackend::Bvh, true);
+    assert!(!instances.has_geometry(), "{}", instances.reason);
+}
