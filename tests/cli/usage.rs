@@ -53,6 +53,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--exposure", "nan", "finite"),
         ("--tonemap", "filmic", "clip, exponential, reinhard, aces"),
         ("--trace", "rtx", "auto, ray-query, bvh"),
+        ("--bvh-quality", "best", "fast, default, high"),
         ("--filter", "sinc", "box"),
         ("--shaders", "no-such-folder", "no-such-folder"),
         ("-o", "image.jpg", ".exr"),
@@ -104,7 +105,7 @@ fn help_names_everything_of_the_contract_and_marks_what_is_not_built() {
     for flag in
         "--resolution --camera --spp --time --target-error --samples --seed --max-bounces --integrator --sampler \
         --light-sampling --mis --filter --env --env-strength --env-rotation --env-sampling --aov --denoise --exposure \
-        --tonemap --device --trace --checkpoint --resume --json --quiet --strict --shaders --estimate --output"
+        --tonemap --device --trace --bvh-quality --checkpoint --resume --json --quiet --strict --shaders --estimate --output"
             .split_whitespace()
     {
         assert!(help.contains(flag), "{flag}");
