@@ -1,5 +1,5 @@
 # The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
-.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short test test-drivers stress lint references gallery clean
+.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short bench-speed test test-drivers stress lint references gallery clean
 .DEFAULT_GOAL := help
 
 help: ## lists these commands
@@ -43,11 +43,14 @@ references: ## makes the reference images and values again with Mitsuba 3 (a qua
 	python3 tests/reference/make_bsdf_table.py
 	python3 tests/reference/make_bsdf_images.py
 
-bench-peers: build ## time against error beside Mitsuba 3 and Cycles, seven scenes (a quarter of an hour)
+bench-peers: build ## time against error beside Mitsuba 3, Cycles and LuxCore, seven scenes (a quarter of an hour)
 	python3 benches/peers/run.py
 
 bench-peers-short: build ## the short form of it for CI: Mitsuba alone, one scene
 	python3 benches/peers/run.py --short
+
+bench-speed: build ## million paths a second beside Mitsuba 3, five scenes (a few minutes)
+	python3 benches/peers/speed.py
 
 gallery: build ## renders other people's models to docs/gallery (MODELS=FOLDER; a quarter of an hour on two cores)
 	@test -n "$(MODELS)" || { echo "say where the models are: make gallery MODELS=FOLDER" >&2; exit 2; }

@@ -29,12 +29,18 @@ RENDERERS = {
 }
 
 # What a renderer has no match for. LuxCore's one GGX metal (`disney`, metallic 1) is darker by 13 % where lamps are sampled
-# than where its own samples meet them. None of its scenes here has an environment, so its adapter knows none.
-LACKS = {"luxcore": {"metal", "environment"}}
+# than where its own samples meet them. None of its scenes here has an environment, so its adapter knows none; instances are
+# for speed.py, which asks Mitsuba alone.
+LACKS = {"luxcore": {"metal", "environment", "instances"}, "cycles": {"instances"}}
 
 
 def needs(scene) -> set:
-    return {mesh.material.kind for mesh in scene.meshes} | ({"environment"} if scene.environment is not None else set())
+    kinds = {mesh.material.kind for mesh in scene.meshes}
+    if scene.environment is not None:
+        kinds.add("environment")
+    if any(mesh.places is not None for mesh in scene.meshes):
+        kinds.add("instances")
+    return kinds
 
 
 class ChildFailed(Exception):

@@ -54,17 +54,24 @@ def write_gltf(scene, folder: Path) -> Path:
                           "count": len(array) if kind == "VEC3" else array.size})
         return len(accessors) - 1
 
+    nodes, meshes = [{"camera": 0, "matrix": scene.camera_to_world().T.ravel().tolist()}], []
     for mesh in scene.meshes:
         bounds = {"min": mesh.positions.min(axis=0).tolist(), "max": mesh.positions.max(axis=0).tolist()}
-        primitives.append({"attributes": {"POSITION": accessor(mesh.positions, "VEC3", 5126, **bounds)},
-                           "indices": accessor(mesh.triangles, "SCALAR", 5125), "material": len(materials)})
+        primitive = {"attributes": {"POSITION": accessor(mesh.positions, "VEC3", 5126, **bounds)},
+                     "indices": accessor(mesh.triangles, "SCALAR", 5125), "material": len(materials)}
         materials.append(material_to_gltf(mesh.material))
+        if mesh.places is None:
+            primitives.append(primitive)
+            continue
+        nodes += [{"mesh": len(meshes), "matrix": place.T.ravel().tolist()} for place in mesh.places]
+        meshes.append({"primitives": [primitive]})
+    nodes.append({"mesh": len(meshes)})
+    meshes.append({"primitives": primitives})
     camera = {"type": "perspective",
               "perspective": {"yfov": math.radians(scene.yfov_degrees), "aspectRatio": 1.0, "znear": 0.01}}
     document = {
-        "asset": {"version": "2.0", "generator": "sunfleck benches/peers"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
-        "nodes": [{"mesh": 0}, {"camera": 0, "matrix": scene.camera_to_world().T.ravel().tolist()}],
-        "meshes": [{"primitives": primitives}], "materials": materials, "cameras": [camera],
+        "asset": {"version": "2.0", "generator": "sunfleck benches/peers"}, "scene": 0,
+        "scenes": [{"nodes": list(range(len(nodes)))}], "nodes": nodes, "meshes": meshes, "materials": materials, "cameras": [camera],
         "accessors": accessors, "bufferViews": views,
         "buffers": [{"uri": f"{scene.name}.bin", "byteLength": len(data)}],
         "extensionsUsed": ["KHR_materials_ior", "KHR_materials_emissive_strength"],

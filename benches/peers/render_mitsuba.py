@@ -45,6 +45,18 @@ def shape(index: int, mesh):
     return out
 
 
+def placed(index: int, mesh) -> dict:
+    """The mesh, or its instances."""
+    if mesh.places is None:
+        return {f"mesh{index}": shape(index, mesh)}
+    group = f"group{index}"
+    out = {group: {"type": "shapegroup", "mesh": shape(index, mesh)}}
+    for k, place in enumerate(mesh.places):
+        out[f"{group}-{k}"] = {"type": "instance", "to_world": mi.ScalarTransform4f(place),
+                               "group": {"type": "ref", "id": group}}
+    return out
+
+
 class Mitsuba:
     def __init__(self):
         mi.set_variant(choose_mitsuba_variant(mi))
@@ -66,7 +78,8 @@ class Mitsuba:
                    "sensor": {"type": "perspective", "fov": scene.yfov_degrees, "fov_axis": "y", "near_clip": 1e-3,
                               "to_world": to_world, "film": film,
                               "sampler": {"type": self.sampler, "sample_count": 1}}}
-        objects |= {f"mesh{i}": shape(i, mesh) for i, mesh in enumerate(scene.meshes)}
+        for i, mesh in enumerate(scene.meshes):
+            objects |= placed(i, mesh)
         if scene.environment is not None:
             # Sunfleck's u is atan2(z, x)/2π, Mitsuba's atan2(x, −z)/2π: a quarter turn about +Y.
             turn = mi.ScalarTransform4f(numpy.array([[0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]]))

@@ -55,7 +55,7 @@ class Sunfleck:
         with OpenEXR.File(str(out)) as file:
             image = file.channels()["RGB"].pixels
         return image, {"start": start, "load": load, "compile": seconds["compile"], "render": seconds["render"],
-                       "version": self.version}
+                       "version": self.version, "rays_per_path": report["rays"] / report["paths"]}
 
 
 if __name__ == "__main__":

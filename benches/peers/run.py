@@ -126,7 +126,7 @@ def compare_scene(name, renderers, chosen) -> dict:
             children[renderer] = Child(renderer, name, chosen.out, chosen.resolution, options, chosen.timeout)
         images = measured(children, chosen)
         truth = references(children, images, chosen)
-        result = {"scene": name, "title": scene.title, "triangles": sum(len(m.triangles) for m in scene.meshes),
+        result = {"scene": name, "title": scene.title, "triangles": scene.triangle_count(),
                   "max_bounces": scene.max_bounces, "renderers": {}, "equality": {},
                   "lacks": {renderer: what for renderer, what in missing.items() if what}}
         for renderer, child in children.items():

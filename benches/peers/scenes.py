@@ -27,6 +27,7 @@ class Mesh:
     material: Material
     positions: numpy.ndarray  # float32, N × 3
     triangles: numpy.ndarray  # uint32, M × 3
+    places: numpy.ndarray | None = None  # K × 4 × 4: instances; None is one, where the positions say
 
 
 @dataclass
@@ -40,9 +41,14 @@ class Scene:
     meshes: list = field(default_factory=list)
     environment: numpy.ndarray | None = None  # float32, height × width × 3, latitude/longitude, north on top
 
-    def add(self, material, shape) -> None:
+    def add(self, material, shape, places=None) -> None:
         positions, triangles = shape
-        self.meshes.append(Mesh(material, numpy.asarray(positions, numpy.float32), numpy.asarray(triangles, numpy.uint32)))
+        self.meshes.append(Mesh(material, numpy.asarray(positions, numpy.float32), numpy.asarray(triangles, numpy.uint32),
+                                places))
+
+    def triangle_count(self) -> int:
+        """Instances counted one by one."""
+        return sum(len(m.triangles) * (1 if m.places is None else len(m.places)) for m in self.meshes)
 
     def camera_to_world(self) -> numpy.ndarray:
         """4 × 4; the camera looks down its −Z."""
@@ -152,6 +158,35 @@ def bumpy_159k() -> Scene:
 
 def bumpy_2m() -> Scene:
     return bumpy("bumpy_2m", "A mesh of 1,957,200 triangles", 700)
+
+
+def bumpy_10m() -> Scene:
+    return bumpy("bumpy_10m", "A mesh of ten million triangles", 1582)
+
+
+def instanced(name, title, n, across) -> Scene:
+    """A plain with across² bumpy spheres of 4n(n − 1) triangles, turned and scaled by chance, under a square lamp."""
+    scene = Scene(name, title, (0, 5.5, 15), (0, -0.6, 2), 40, 7)
+    grey, clay = Material("grey", colour=(0.5, 0.5, 0.5)), Material("clay", colour=(0.7, 0.5, 0.4))
+    scene.add(grey, rectangle((0, -1, 0), rotation("x", -90), (16, 16)))
+    lamp = Material("lamp", colour=(0, 0, 0), emission=(6, 6, 6))
+    scene.add(lamp, rectangle((0, 12, 4), rotation("x", 90), (4, 4)))
+    random, places = numpy.random.default_rng(3), numpy.tile(numpy.eye(4), (across * across, 1, 1))
+    for k, place in enumerate(places):
+        size = random.uniform(0.5, 1.0) * 8 / across
+        turn = rotation("y", random.uniform(0, 360)) @ rotation("x", random.uniform(0, 360))
+        place[:3, :3] = turn * size
+        place[:3, 3] = (16 * (k % across + 0.5) / across - 8, size - 1, 16 * (k // across + 0.5) / across - 8)
+    scene.add(clay, sphere((0, 0, 0), 1.0, n=n, bumps=1), places)
+    return scene
+
+
+def instances() -> Scene:
+    return instanced("instances", "A thousand instances of a mesh of 9,800 triangles", 50, 32)
+
+
+def billion() -> Scene:
+    return instanced("billion", "A billion instanced triangles", 500, 32)
 
 
 def plates() -> Scene:
@@ -274,6 +309,6 @@ def emitters(lit=10_000) -> Scene:
 
 
 SCENES = {make.__name__: make for make in (cornell, cornell_moved, plates, sun, caustic, lights, emitters, million, bumpy_9k,
-                                            bumpy_159k, bumpy_2m)}
+                                            bumpy_159k, bumpy_2m, bumpy_10m, instances, billion)}
 # What run.py renders without --scenes; the others are for speed.py.
 COMPARED = ("cornell", "plates", "sun", "caustic", "lights", "emitters", "million")

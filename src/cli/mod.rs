@@ -19,6 +19,7 @@ mod progress;
 mod render;
 mod render_args;
 mod render_report;
+mod shaders;
 mod tone_args;
 mod watch;
 
@@ -55,6 +56,7 @@ enum Command {
     Compare(compare::CompareArgs),
     Merge(merge::MergeArgs),
     Bench(Box<bench::BenchArgs>),
+    Shaders(shaders::ShadersArgs),
     Watch(watch::WatchArgs),
 }
 
@@ -75,6 +77,7 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Compare(args) => compare::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Bench(args) => bench::run(*args),
+        Command::Shaders(args) => Ok(shaders::run(&args)?),
         Command::Watch(_) => unreachable!("refused as not built"),
     }
 }
