@@ -15,6 +15,7 @@ mod fold;
 mod instruction;
 mod module;
 mod propagate;
+mod search;
 mod uses;
 
 pub use bake::{BakedScene, BakedTable, bake};
