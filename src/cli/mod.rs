@@ -19,6 +19,7 @@ mod progress;
 mod render;
 mod render_args;
 mod render_report;
+mod shaders;
 mod tone_args;
 mod watch;
 
@@ -55,7 +56,11 @@ enum Command {
     Compare(compare::CompareArgs),
     Merge(merge::MergeArgs),
     Bench(Box<bench::BenchArgs>),
-    Watch(watch::WatchArgs),
+    Watch(Box<watch::WatchArgs>),
+    Shaders(shaders::ShadersArgs),
+    /// Renders for `watch`, which speaks to it over standard input and output.
+    #[command(hide = true)]
+    WatchWorker(Box<watch::WorkerArgs>),
 }
 
 /// Parses the process's arguments; a usage error or `--help` ends the process.
@@ -75,7 +80,9 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Compare(args) => compare::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Bench(args) => bench::run(*args),
-        Command::Watch(_) => unreachable!("refused as not built"),
+        Command::Watch(args) => watch::run(&args),
+        Command::Shaders(args) => shaders::run(&args),
+        Command::WatchWorker(args) => watch::run_worker(&args),
     }
 }
 

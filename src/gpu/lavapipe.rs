@@ -47,7 +47,8 @@ fn manifests() -> Vec<PathBuf> {
 
 fn search_folders() -> Vec<PathBuf> {
     let home = env::var_os("HOME").map(PathBuf::from);
-    let one = |name, default: &str| env::var_os(name).map(PathBuf::from).or_else(|| home.as_ref().map(|h| h.join(default)));
+    let one =
+        |name, default: &str| env::var_os(name).map(PathBuf::from).or_else(|| home.as_ref().map(|h| h.join(default)));
     let list = |name, default: &str| -> Vec<PathBuf> {
         env::split_paths(&env::var_os(name).unwrap_or_else(|| default.into())).collect()
     };

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk::BufferUsageFlags as Usage;
+use glam::DVec3;
 
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
@@ -109,6 +110,30 @@ impl PathTracer {
     /// What the kernel was built with.
     pub fn key(&self) -> &KernelKey {
         &self.key
+    }
+
+    /// Builds the kernel anew, for other settings or shaders, and keeps the scene on the device. `prepared` is the scene
+    /// that was uploaded. On an error the tracer is as it was.
+    ///
+    /// # Errors
+    /// A shader that does not compile, a lost device.
+    pub fn rebuild(&mut self, gpu: &Arc<Gpu>, prepared: &Prepared, camera: &Camera, settings: &Settings) -> Result<()> {
+        let start = Instant::now();
+        let form = (self.key.array_form, self.key.chunk_shift);
+        let key = KernelKey::new(prepared, camera, settings, self.key.trace, form);
+        let kernel =
+            build_kernel(gpu, &key, settings, self.overrides, &self.buffers, &self.constants_buffer, &self.slices)?;
+        self.slices[0].warm_up(&kernel)?;
+        (self.key, self.kernel) = (key, kernel);
+        self.constants.max_bounces = effective_max_bounces(settings);
+        self.constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
+        self.compile_seconds = start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Looks through another camera of the same kind (lens, projection), on a film of another size.
+    pub fn look_through(&mut self, camera: &Camera, origin: DVec3, width: u32, height: u32) {
+        camera_constants(camera, origin, width, height, &mut self.constants);
     }
 
     /// Bytes of device memory in use.
@@ -276,8 +301,11 @@ fn build_kernel(
     )?)
 }
 
-/// The embedded variant, or one compiled from `--shaders`.
+/// What the shader loop has compiled, else the embedded variant, or one compiled from `--shaders`.
 fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
+    if let Some(spirv) = &settings.kernel_spirv {
+        return Ok(spirv.to_vec());
+    }
     let Some(folder) = &settings.shaders_dir else {
         let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
         return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
