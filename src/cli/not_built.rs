@@ -30,6 +30,7 @@ fn estimator(command: &Command, uses: fn(&EstimatorArgs) -> bool) -> bool {
     match command {
         Command::Render(args) => uses(&args.estimator),
         Command::Bench(args) => uses(&args.estimator),
+        Command::Watch(args) => uses(&args.job.estimator),
         _ => false,
     }
 }

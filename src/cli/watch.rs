@@ -32,7 +32,7 @@ const PORT: u16 = 8417;
 #[command(after_help = EXAMPLES)]
 pub(crate) struct WatchArgs {
     #[command(flatten)]
-    job: WorkerArgs,
+    pub(super) job: WorkerArgs,
     #[command(flatten)]
     tone: ToneArgs,
     /// Port of the page [default: 8417, or any that is free].

@@ -25,7 +25,7 @@ let log = "";
 const address = await new Promise((resolve, reject) => {
   child.stderr.on("data", (data) => {
     log += data;
-    const found = log.match(/page: (\S+)/);
+    const found = log.match(/page: (\S+)\n/);
     if (found) resolve(found[1]);
   });
   child.on("exit", () => reject(new Error(`sunfleck has ended:\n${log}`)));
