@@ -279,7 +279,9 @@ function showEdits() {
     const error = report.error === null ? "–" : `${(100 * report.error).toPrecision(2)} %`;
     const row = document.createElement("tr");
     const compile = report.compile_ms === null ? report.build_ms : report.compile_ms + (report.build_ms ?? 0);
-    const cells = [`${report.edit} ${report.what}`, ms(compile), ms(report.first_image_ms), rate + ratio(report.speed_ratio), error + ratio(report.error_ratio)];
+    const name = report.what.replaceAll(/[^ ,]*\//g, "");
+    row.title = report.what;
+    const cells = [`${report.edit} ${name}`, ms(compile), ms(report.first_image_ms), rate + ratio(report.speed_ratio), error + ratio(report.error_ratio)];
     row.append(...cells.map((text) => {
       const cell = document.createElement("td");
       cell.textContent = text;

@@ -74,7 +74,7 @@ export class Plot {
 
   axis(context, low, high, name, tick) {
     context.globalAlpha = 1;
-    const step = high - low > 3 ? 1 : 0.5;
+    const step = high - low > 2 ? 1 : 0.5;
     for (let v = Math.ceil(low / step) * step; v <= high + 1e-9; v += step) tick(10 ** v, name(10 ** v));
   }
 }

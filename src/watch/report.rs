@@ -30,6 +30,13 @@ pub(super) struct Report {
     /// Of the error at the same number of samples.
     pub(super) error_ratio: Option<f64>,
     pub(super) is_measured: bool,
+    /// What the figures were measured on: another view, other figures.
+    #[serde(skip)]
+    view: String,
+    #[serde(skip)]
+    start: Option<u32>,
+    #[serde(skip)]
+    is_said: bool,
 }
 
 impl Report {
@@ -47,12 +54,22 @@ impl Report {
             speed_ratio: None,
             error_ratio: None,
             is_measured: false,
+            view: String::new(),
+            start: None,
+            is_said: false,
         }
     }
 
-    /// Takes in an image of this edit. `true` once, when it has the samples that are compared.
-    pub(super) fn observe(&mut self, frame: &Frame, before: Option<&Self>) -> bool {
+    /// Takes in an image of this edit, of what `view` names. `true` once, when it has the samples that are compared. After a
+    /// change of the view it is measured again, so that the next edit is held against the same.
+    pub(super) fn observe(&mut self, frame: &Frame, view: &str, before: Option<&Self>) -> bool {
         self.first_image_ms.get_or_insert(1e3 * self.saved.elapsed().as_secs_f64());
+        if self.start != Some(frame.start) && !frame.moving {
+            self.start = Some(frame.start);
+            view.clone_into(&mut self.view);
+            self.is_measured = false;
+            (self.speed_ratio, self.error_ratio) = (None, None);
+        }
         if self.is_measured || frame.moving {
             return false;
         }
@@ -60,14 +77,14 @@ impl Report {
         self.error = frame.error;
         self.rays_per_second = Some(frame.rays as f64 / frame.seconds.max(1e-9));
         self.is_measured = frame.spp >= COMPARED_SPP || frame.done;
-        if let Some(before) = before.filter(|_| self.is_measured) {
+        if let Some(before) = before.filter(|before| self.is_measured && before.view == self.view) {
             let ratio = |a: Option<f64>, b: Option<f64>| Some(a? / b.filter(|b| *b > 0.0)?);
             self.speed_ratio = ratio(self.rays_per_second, before.rays_per_second);
             // Errors of different numbers of samples are brought to the same by 1/√n.
             let scale = (f64::from(self.spp) / f64::from(before.spp.max(1))).sqrt();
             self.error_ratio = ratio(self.error, before.error).map(|ratio| ratio * scale);
         }
-        self.is_measured
+        self.is_measured && !std::mem::replace(&mut self.is_said, self.is_measured)
     }
 }
 
@@ -118,12 +135,16 @@ mod tests {
     #[test]
     fn an_edit_is_measured_once_and_held_against_the_one_before() {
         let mut before = Report::new(0, "start".to_owned(), Instant::now());
-        assert!(!before.observe(&frame(16, 0.2), None));
-        assert!(before.observe(&frame(64, 0.1), None));
+        assert!(!before.observe(&frame(16, 0.2), "v", None));
+        assert!(before.observe(&frame(64, 0.1), "v", None));
         let mut report = Report::new(1, "a.glsl".to_owned(), Instant::now());
-        assert!(report.observe(&frame(256, 0.025), Some(&before)));
+        assert!(report.observe(&frame(256, 0.025), "v", Some(&before)));
         assert_eq!((report.speed_ratio, report.error_ratio), (Some(1.0), Some(0.5)));
-        assert!(!report.observe(&frame(512, 0.01), Some(&before)));
+        assert!(!report.observe(&frame(512, 0.01), "v", Some(&before)));
+        let moved = Frame { start: 2, ..frame(64, 0.5) };
+        let mut other = report.clone();
+        assert!(!other.observe(&moved, "w", Some(&before)), "it was said already");
+        assert_eq!((other.speed_ratio, other.error, other.is_measured), (None, Some(0.5), true));
         report.first_image_ms = Some(12.0);
         assert_eq!(
             report.to_string(),

@@ -248,8 +248,9 @@ impl Session {
         self.hub.set_frame(&json.to_string(), png);
         let Some(index) = self.reports.iter().rposition(|report| report.edit == frame.edit) else { return };
         let before = self.reports[..index].iter().rev().find(|report| report.is_measured).cloned();
+        let view = format!("{} {:?} {}", self.view.camera, self.view.pose, self.view.integrator);
         let is_first = self.reports[index].first_image_ms.is_none();
-        if self.reports[index].observe(frame, before.as_ref()) {
+        if self.reports[index].observe(frame, &view, before.as_ref()) {
             let line = self.reports[index].to_string();
             self.say(&line);
             self.show_status();

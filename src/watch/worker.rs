@@ -238,6 +238,10 @@ impl Worker {
             if self.view.moving && first == 0 {
                 return ControlFlow::Continue(());
             }
+            // The slices in flight still come in; a second message must not take the place of the first.
+            if waiting.is_some() {
+                return ControlFlow::Break(());
+            }
             match inbox.try_recv() {
                 Ok(message) => {
                     waiting = Some(message);

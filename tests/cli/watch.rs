@@ -102,3 +102,29 @@ fn a_saved_shader_is_measured_a_broken_one_is_located_and_rendering_goes_on() {
     std::fs::write(&leaf, original).unwrap();
     watch.expect(&["include/bsdf_lambertian.glsl:", "first image", "64 spp"]);
 }
+
+/// Longer than anyone waits, and beyond the limit that software drivers have for one loop.
+const SPIN: &str = "
+float spin(float s) {
+    for (uint i = 0u; i < 0xffffffffu; i++)
+        for (uint j = 0u; j < 0xffffffffu; j++)
+            for (uint k = 0u; k < 0xffffffffu; k++) s = fract(s * 1.7 + float(k));
+    return s;
+}
+";
+
+#[test]
+fn a_kernel_that_hangs_costs_a_worker_and_the_last_good_one_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let shaders = folder.path().join("shaders");
+    assert_eq!(export(&shaders, &[]).0, Some(0));
+    let leaf = shaders.join("include/bsdf_lambertian.glsl");
+    let original = std::fs::read_to_string(&leaf).unwrap();
+    let watch = Watch::start(&["--hang", "8s"], &shaders);
+    watch.expect(&["start:", "64 spp"]);
+    let hangs = original.replace("p.color * INV_PI", "p.color * (INV_PI + 1e-9 * spin(wi.x))");
+    std::fs::write(&leaf, hangs.replacen('\n', SPIN, 1)).unwrap();
+    watch.expect(&["silent for 8 s", "path_trace.comp of edit 1", "started again with that of edit 0"]);
+    std::fs::write(&leaf, original.replace("p.color", "(0.5 * p.color)")).unwrap();
+    watch.expect(&["include/bsdf_lambertian.glsl:", "first image", "64 spp"]);
+}

@@ -20,7 +20,7 @@ const figures = {};
 
 assert.equal(spawnSync(sunfleck, ["shaders", "export", shaders]).status, 0, "shaders export");
 const original = readFileSync(leaf, "utf8");
-const child = spawn(sunfleck, ["watch", "cornell", "--shaders", shaders, "--port", "0", "--spp", "64"], { stdio: ["ignore", "ignore", "pipe"] });
+const child = spawn(sunfleck, ["watch", "cornell", "--shaders", shaders, "--port", "0", "--spp", "64", "--resolution", process.env.SUNFLECK_E2E_RESOLUTION ?? "256x256"], { stdio: ["ignore", "ignore", "pipe"] });
 let log = "";
 const address = await new Promise((resolve, reject) => {
   child.stderr.on("data", (data) => {
@@ -95,6 +95,9 @@ try {
   await step("mend", async () => {
     writeFileSync(leaf, original);
     await page.waitForFunction(() => document.getElementById("problems").hidden, null, { timeout: 60000 });
+    await edit(2);
+    const mended = await mean();
+    assert(Math.abs(mended[0] / mended[2] - before[0] / before[2]) < 0.1, `as before: ${before} ${mended}`);
   });
   await step("switch the integrator", async () => {
     await page.selectOption("#integrator", "emission");
