@@ -276,7 +276,7 @@ function showEdits() {
   const ratio = (value) => (value === null ? "" : ` ×${value.toFixed(2)}`);
   const rows = status.reports.toReversed().map((report) => {
     const rate = report.rays_per_second === null ? "–" : (report.rays_per_second / 1e6).toFixed(2);
-    const error = report.error === null ? "–" : `${(100 * report.error).toPrecision(2)} %`;
+    const error = report.error === null || !report.is_measured ? "–" : `${(100 * report.error).toPrecision(2)} %`;
     const row = document.createElement("tr");
     const compile = report.compile_ms === null ? report.build_ms : report.compile_ms + (report.build_ms ?? 0);
     const name = report.what.replaceAll(/[^ ,]*\//g, "");

@@ -99,6 +99,24 @@ try {
     const mended = await mean();
     assert(Math.abs(mended[0] / mended[2] - before[0] / before[2]) < 0.1, `as before: ${before} ${mended}`);
   });
+  // SUNFLECK_E2E_EDITS=20 measures as many edits: medians from the save to the error, and to the first new image.
+  const times = { error: [], image: [] };
+  for (let i = 0; i < Number(process.env.SUNFLECK_E2E_EDITS ?? 0); i++) {
+    let start = performance.now();
+    writeFileSync(leaf, `${original}\nfloat broken() { return undeclared_${i}; }\n`);
+    await page.waitForFunction((i) => document.getElementById("problems").textContent.includes(`undeclared_${i}`), i);
+    times.error.push(performance.now() - start);
+    const before = await page.evaluate(() => document.body.dataset.edit);
+    start = performance.now();
+    writeFileSync(leaf, original.replaceAll("p.color", `(p.color * ${1 - i / 100})`));
+    await page.waitForFunction((before) => document.body.dataset.edit !== before, before, { timeout: 60000 });
+    times.image.push(performance.now() - start);
+  }
+  for (const [name, list] of Object.entries(times)) {
+    if (list.length > 0) figures[`save to ${name}, median`] = Math.round(list.sort((a, b) => a - b)[list.length >> 1]);
+  }
+  writeFileSync(leaf, original);
+
   await step("switch the integrator", async () => {
     await page.selectOption("#integrator", "emission");
     await page.waitForFunction(() => document.getElementById("command").textContent.includes("--integrator=emission"));
