@@ -123,9 +123,9 @@ fn a_worker_that_hangs_or_dies_is_replaced_and_the_loop_goes_on() {
     let leaf = shaders.join("include/bsdf_lambertian.glsl");
     let original = std::fs::read_to_string(&leaf).unwrap();
     // Samples without end, so that it is at work.
-    let watch = Watch::start(&["--hang", "4s", "--spp", "100000000"], &shaders);
-    watch.expect(&["start:", "64 spp"]);
-    for (signal, words) in [("-STOP", "silent for 4 s"), ("-KILL", "signal: 9")] {
+    let watch = Watch::start(&["--hang", "10s", "--spp", "100000000"], &shaders);
+    watch.expect(&["start:", "spp"]);
+    for (signal, words) in [("-STOP", "silent for 10 s"), ("-KILL", "signal: 9")] {
         let worker = worker_of(watch.child.id()).expect("there is a worker");
         assert!(Command::new("kill").args([signal, &worker.to_string()]).status().unwrap().success());
         watch.expect(&["the worker", words, "path_trace.comp of edit", "started again"]);
