@@ -17,7 +17,7 @@ CameraRay camera_ray(RenderConstants constants, uvec2 pixel, vec4 u) {
     if (HAS_ORTHOGRAPHIC && constants.projection == PROJECTION_ORTHOGRAPHIC)
         return CameraRay(constants.camera_origin + offset, constants.camera_forward);
     vec3 direction = constants.camera_forward + offset;
-    if (!HAS_LENS) return CameraRay(constants.camera_origin, normalize(direction));
+    if (!HAS_LENS || constants.lens_radius == 0.0) return CameraRay(constants.camera_origin, normalize(direction));
     // Thin lens: the ray through the pinhole meets the plane in focus where the ray from the lens point must (PBR §5.2.3).
     vec2 disk = sqrt(u.z) * cos_sin_turns(u.w) * constants.lens_radius;
     vec3 lens = normalize(constants.camera_right) * disk.x + normalize(constants.camera_up) * disk.y;

@@ -81,7 +81,7 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Merge(args) => merge::run(&args),
         Command::Bench(args) => bench::run(*args),
         Command::Watch(args) => watch::run(&args),
-        Command::Shaders(args) => shaders::run(&args),
+        Command::Shaders(args) => Ok(shaders::run(&args)?),
         Command::WatchWorker(args) => watch::run_worker(&args),
     }
 }

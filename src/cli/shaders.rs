@@ -1,57 +1,96 @@
-//! `sunfleck shaders`: the sources that are embedded in the binary.
+//! `sunfleck shaders`: the shader sources that are inside the program, to start from, and a check of one's own.
 
+use std::collections::BTreeSet;
 use std::fs;
-use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use sunfleck::film::output::write_atomically;
 use sunfleck::gpu::embedded::SOURCES;
+use sunfleck::gpu::shader_compiler::{compile, read_sources};
 use sunfleck::{Error, Result};
 
-/// Shader sources.
-#[derive(Args, Clone, Debug)]
+/// Write the built-in shader sources to a folder, or check a folder of them.
+#[derive(Args, Debug)]
 pub(crate) struct ShadersArgs {
     #[command(subcommand)]
     command: ShadersCommand,
 }
 
-#[derive(Clone, Debug, Subcommand)]
+#[derive(Subcommand, Debug)]
 enum ShadersCommand {
-    Export(ExportArgs),
+    /// Write the built-in sources to a folder: a start for `render --shaders DIR`.
+    Export {
+        /// The folder; it is made if it is not there.
+        folder: PathBuf,
+        /// Overwrite files that are there.
+        #[arg(long)]
+        force: bool,
+    },
+    /// Compile the path tracer of a folder for every way to trace and to read the scene, and every test kernel, without a
+    /// device.
+    Check {
+        /// The folder, as for `render --shaders`.
+        folder: PathBuf,
+    },
 }
 
-/// Write the embedded shader sources to a folder, for --shaders and watch.
-#[derive(Args, Clone, Debug)]
-struct ExportArgs {
-    /// The folder; it is made if there is none.
-    #[arg(value_name = "DIR")]
-    folder: PathBuf,
-    /// Overwrite files that are there.
-    #[arg(long)]
-    force: bool,
+/// Does what the subcommand says.
+pub(crate) fn run(args: &ShadersArgs) -> Result<()> {
+    match &args.command {
+        ShadersCommand::Export { folder, force } => export(folder, *force),
+        ShadersCommand::Check { folder } => check(folder),
+    }
 }
 
-/// Does what is asked for.
-pub(crate) fn run(args: &ShadersArgs) -> anyhow::Result<()> {
-    let ShadersCommand::Export(args) = &args.command;
-    Ok(export(args)?)
-}
-
-fn export(args: &ExportArgs) -> Result<()> {
-    // Before anything is written: all or nothing.
-    let taken: Vec<_> = SOURCES.iter().filter(|(name, _)| args.folder.join(name).exists()).collect();
-    if let (false, Some((name, _))) = (args.force, taken.first()) {
-        let message = format!("{} of {} files are there already; --force overwrites them", taken.len(), SOURCES.len());
-        return Err(Error::input(&args.folder.join(name), message));
+fn export(folder: &Path, force: bool) -> Result<()> {
+    let there: Vec<_> = SOURCES.iter().map(|(name, _)| folder.join(name)).filter(|path| path.exists()).collect();
+    if let (Some(first), false) = (there.first(), force) {
+        let more = there.len() - 1;
+        let others = if more == 0 { String::new() } else { format!(" and {more} more files are") };
+        let verb = if more == 0 { " is" } else { "" };
+        return Err(Error::Usage(format!("{}{others}{verb} there already; --force overwrites", first.display())));
     }
     for (name, text) in SOURCES {
-        let path = args.folder.join(name);
-        let folder = path.parent().unwrap_or(&args.folder);
-        fs::create_dir_all(folder).map_err(|e| Error::io(folder, "make the folder", e))?;
-        write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+        let path = folder.join(name);
+        let parent = path.parent().unwrap_or(folder);
+        fs::create_dir_all(parent).map_err(|error| Error::io(parent, "make the folder", error))?;
+        fs::write(&path, text).map_err(|error| Error::io(&path, "write", error))?;
     }
-    eprintln!("{} files in {}", SOURCES.len(), args.folder.display());
-    eprintln!("next: sunfleck watch --shaders {}", args.folder.display());
+    let shown = folder.display();
+    eprintln!("wrote {} files to {shown}; try: sunfleck render --shaders {shown}", SOURCES.len());
     Ok(())
+}
+
+fn check(folder: &Path) -> Result<()> {
+    let sources = read_sources(folder).map_err(|error| Error::io(folder, "read the shader folder", error))?;
+    let kernels: Vec<&String> = sources.keys().filter(|name| name.ends_with(".comp")).collect();
+    if kernels.is_empty() {
+        return Err(Error::input(folder, "there is no .comp file in it"));
+    }
+    let (mut failed, mut messages) = (Vec::new(), BTreeSet::new());
+    for kernel in &kernels {
+        // The path tracer alone is built in every variant; the first that does not compile speaks for the others.
+        let tried = if *kernel == "path_trace.comp" { variants() } else { variants()[..1].to_vec() };
+        let broken = tried.iter().find_map(|defines| compile(&sources, kernel, defines).err());
+        if let Some(error) = broken {
+            // An include that is broken is so for every kernel.
+            if messages.insert(error.message.clone()) {
+                eprintln!("{}", error.message.trim_end());
+            }
+            failed.push(kernel.as_str());
+        }
+    }
+    if failed.is_empty() {
+        eprintln!("{}: {} kernels compile", folder.display(), kernels.len());
+        return Ok(());
+    }
+    Err(Error::input(folder, format!("does not compile: {}", failed.join(", "))))
+}
+
+/// Each way to trace and each form of the scene's arrays, as the path tracer is built.
+fn variants() -> Vec<Vec<(&'static str, String)>> {
+    let forms = |trace: u32| {
+        (0..3).map(move |form: u32| vec![("TRACE_BACKEND", trace.to_string()), ("ARRAY_FORM", form.to_string())])
+    };
+    (0..2).flat_map(forms).collect()
 }

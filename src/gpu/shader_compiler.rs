@@ -10,7 +10,7 @@ use std::fmt;
 pub struct CompileError {
     /// File that was compiled.
     pub file: String,
-    /// The compiler's messages.
+    /// The compiler's messages, each with the source line that it names.
     pub message: String,
 }
 
@@ -53,13 +53,25 @@ pub fn compile(sources: &Sources, file: &str, defines: &[(&str, String)]) -> Res
     });
     let artifact = compiler
         .compile_into_spirv(source, shaderc::ShaderKind::Compute, file, "main", Some(&options))
-        .map_err(|e| error(e.to_string()))?;
+        .map_err(|e| error(with_source_lines(sources, &e.to_string())))?;
     Ok(artifact.as_binary().to_vec())
 }
 
 /// The file that `requested` means in an `#include` of the file `from`.
 pub fn resolve_include(from: &str, requested: &str) -> String {
     join(from.rsplit_once('/').map_or("", |(folder, _)| folder), requested)
+}
+
+/// The compiler's messages; below each that names a file and a line stands that line.
+fn with_source_lines(sources: &Sources, message: &str) -> String {
+    let source_line = |line: &str| {
+        let mut parts = line.splitn(3, ':');
+        let text = sources.get(parts.next()?)?;
+        let number: usize = parts.next()?.parse().ok()?;
+        text.lines().nth(number.checked_sub(1)?).map(|source| format!("{number:>6} | {source}"))
+    };
+    let lines = message.trim_end().lines().flat_map(|line| [Some(line.to_owned()), source_line(line)]);
+    lines.flatten().collect::<Vec<_>>().join("\n")
 }
 
 /// Resolves `..` in `folder/relative`.

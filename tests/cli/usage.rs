@@ -145,3 +145,29 @@ fn info_describes_the_built_in_scene() {
     let (code, stdout, _) = run_in(Path::new("."), &["info", "cornell"]);
     assert_eq!((code, stdout.as_str()), (0, ""), "what is for people goes to standard error");
 }
+
+#[test]
+fn shaders_are_exported_and_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, stderr) = run_in(folder.path(), &["shaders", "export", "mine"]);
+    assert_eq!(code, 0, "{stderr}");
+    let kernel = folder.path().join("mine/path_trace.comp");
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders/path_trace.comp");
+    assert_eq!(std::fs::read(&kernel).unwrap(), std::fs::read(repository).unwrap());
+    let (code, _, stderr) = run_in(folder.path(), &["shaders", "export", "mine"]);
+    assert!(code == 2 && stderr.contains("are there already; --force"), "{code}: {stderr}");
+    let (code, _, stderr) = run_in(folder.path(), &["shaders", "check", "mine"]);
+    assert!(code == 0 && stderr.contains("kernels compile"), "{code}: {stderr}");
+    let include = folder.path().join("mine/include/mis.glsl");
+    let text = std::fs::read_to_string(&include).unwrap();
+    std::fs::write(&include, format!("{text}\nfloat wrong = oops;\n")).unwrap();
+    let line = text.lines().count() + 2;
+    let (code, _, stderr) = run_in(folder.path(), &["shaders", "check", "mine"]);
+    let place = format!("include/mis.glsl:{line}: error: 'oops'");
+    assert!(code == 3 && stderr.contains(&place) && stderr.contains("| float wrong = oops;"), "{code}: {stderr}");
+    assert!(stderr.contains("does not compile: path_trace.comp"), "{stderr}");
+    let (code, _, _) = run_in(folder.path(), &["shaders", "export", "--force", "mine"]);
+    assert_eq!((code, std::fs::read_to_string(&include).unwrap()), (0, text));
+    let (code, _, stderr) = run_in(folder.path(), &["shaders", "check", "nowhere"]);
+    assert!(code == 3 && stderr.contains("nowhere"), "{code}: {stderr}");
+}

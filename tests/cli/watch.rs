@@ -28,7 +28,7 @@ fn export_writes_every_source_and_overwrites_none_unasked() {
     std::fs::write(&edited, "mine").unwrap();
     std::fs::remove_file(shaders.join("path_trace.comp")).unwrap();
     let (code, message) = export(&shaders, &[]);
-    assert!(code == Some(3) && message.contains("--force"), "{message}");
+    assert!(code == Some(2) && message.contains("--force"), "{message}");
     assert_eq!(std::fs::read_to_string(&edited).unwrap(), "mine");
     assert!(!shaders.join("path_trace.comp").exists(), "nothing is written where something is in the way");
     assert_eq!(export(&shaders, &["--force"]).0, Some(0));

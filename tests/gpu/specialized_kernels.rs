@@ -1,14 +1,15 @@
 //! Every kernel that a scene of ours asks for, specialised: valid, without specialisation constants, without functions
-//! that are not called, and without unreachable code.
+//! that are not called, and without unreachable code; and what is left out of it has no part in the image.
 
 use std::collections::HashSet;
 
 use crate::common::gpu;
-use crate::common::scenes::{all_scenes, scene};
+use crate::common::mutation::write_sources;
+use crate::common::scenes::{all_scenes, scene, short_form};
 use crate::common::spirv::{assert_valid, bytes, instructions, validator_is_there, words};
 use sunfleck::gpu::specialize::specialize;
 use sunfleck::gpu::{ArrayForm, TraceBackend, embedded};
-use sunfleck::render::{KernelKey, prepare_scene};
+use sunfleck::render::{KernelKey, Settings, prepare_scene};
 
 const ENTRY_POINT: u32 = 15;
 const SPEC_CONSTANTS: std::ops::RangeInclusive<u32> = 48..=52;
@@ -66,5 +67,31 @@ fn every_kernel_of_our_scenes_is_valid_and_has_nothing_left_to_specialize() {
                 assert_eq!(specialized.len(), again.len(), "{name}: specialising again takes more away");
             }
         }
+    }
+}
+
+/// Bits of FEATURES that need data which a scene without them does not bring: an environment's image, a bound on light.
+const NEED_DATA: u32 = 1 << 4 | 1 << 17;
+
+/// The image is, bit for bit, that of the kernel with every feature switched on.
+#[test]
+fn what_a_scene_does_not_need_has_no_part_in_its_image() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    write_sources(folder.path(), |name, text| {
+        if name != "include/features.glsl" {
+            return text.to_owned();
+        }
+        let all = (2..=4).fold(text.to_owned(), |text, id| text.replace(&format!("layout(constant_id = {id}) "), ""));
+        all.replace("FEATURES = 0xffffffffu", &format!("FEATURES = {}u", !NEED_DATA))
+    });
+    let film = |name: &str, settings: &Settings| {
+        let film = gpu::run(&mut gpu::path_tracer(&scene(name), settings), 4, 8).film;
+        film.pixels().iter().map(|pixel| pixel.rgb.map(f64::to_bits)).collect::<Vec<_>>()
+    };
+    // The kernel with everything takes a software driver many seconds to compile.
+    for name in if short_form() { &["cornell"][..] } else { &["cornell", "alpha", "volumes"] } {
+        let lean = gpu::settings(32, 32);
+        let full = Settings { shaders_dir: Some(folder.path().to_owned()), ..lean.clone() };
+        assert_eq!(film(name, &lean), film(name, &full), "{name}");
     }
 }
