@@ -155,10 +155,7 @@ impl Session {
         loop {
             let event = if matches!(self.stage, Stage::Build | Stage::Render) {
                 let left = self.options.hang.saturating_sub(self.heard.elapsed());
-                match inbox.recv_timeout(left) {
-                    Ok(event) => Some(event),
-                    Err(_) => None,
-                }
+                inbox.recv_timeout(left).ok()
             } else {
                 inbox.recv().ok()
             };

@@ -337,7 +337,7 @@ impl Worker {
     fn metadata(&self) -> Metadata {
         Metadata {
             seed: Some(self.settings.seed),
-            sample_ranges: vec![0..self.shown.spp],
+            sample_ranges: std::iter::once(0..self.shown.spp).collect(),
             render_time_seconds: Some(self.shown.seconds as f32),
             chromaticities: Some(REC709_CHROMATICITIES),
             software: Some(software()),
