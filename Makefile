@@ -1,5 +1,5 @@
 # The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
-.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short bench-speed test test-drivers stress lint references gallery clean
+.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short bench-speed test test-drivers e2e stress lint references gallery clean
 .DEFAULT_GOAL := help
 
 help: ## lists these commands
@@ -29,6 +29,9 @@ test: deps ## builds and runs every test on the device of this machine
 
 test-drivers: deps ## runs the tests of the GPU on lavapipe 22, lavapipe 25 (both back ends) and SwiftShader
 	@scripts/test-drivers.sh
+
+e2e: build ## drives the page of `watch` in headless Chromium (wants node, chromium, and playwright-core from npm)
+	node tests/e2e/watch.mjs target/release/sunfleck
 
 stress: deps ## numbers under stress, in full, on the device of this machine (a quarter of an hour and more)
 	SUNFLECK_STRESS=full cargo test --test stress -- --nocapture --test-threads 1

@@ -11,6 +11,7 @@
 //! | [`render`] | what is asked for, the kernel for it, slices on a device, and the result |
 //! | [`film`] | sums of samples in f64; EXR and PNG, merging, error metrics; knows neither the GPU nor scenes |
 //! | [`mod@bench`] | run time against error: repeated renders, their errors to a reference, slopes, verdicts, plots |
+//! | [`watch`] | the shader loop: a worker process that renders, files that change, the page that shows it |
 //! | [`error`] | what can end a run, and the exit code each kind has |
 //!
 //! From a scene to an image, as `sunfleck render cornell -o cornell.exr` does it:
@@ -43,5 +44,6 @@ mod named_enum;
 pub mod prepare;
 pub mod render;
 pub mod scene;
+pub mod watch;
 
 pub use error::{Error, Result};

@@ -56,8 +56,11 @@ enum Command {
     Compare(compare::CompareArgs),
     Merge(merge::MergeArgs),
     Bench(Box<bench::BenchArgs>),
+    Watch(Box<watch::WatchArgs>),
     Shaders(shaders::ShadersArgs),
-    Watch(watch::WatchArgs),
+    /// Renders for `watch`, which speaks to it over standard input and output.
+    #[command(hide = true)]
+    WatchWorker(Box<watch::WorkerArgs>),
 }
 
 /// Parses the process's arguments; a usage error or `--help` ends the process.
@@ -77,8 +80,9 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Compare(args) => compare::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Bench(args) => bench::run(*args),
+        Command::Watch(args) => watch::run(&args),
         Command::Shaders(args) => Ok(shaders::run(&args)?),
-        Command::Watch(_) => unreachable!("refused as not built"),
+        Command::WatchWorker(args) => watch::run_worker(&args),
     }
 }
 

@@ -12,7 +12,6 @@ use super::render_args::RenderArgs;
 type Entry = (&'static str, fn(&Command) -> bool);
 
 const NOT_BUILT: &[Entry] = &[
-    ("watch", |c| matches!(c, Command::Watch(_))),
     ("--aov", |c| render(c, |r| !r.aov.is_empty())),
     ("--denoise", |c| render(c, |r| r.denoise)),
     ("--checkpoint", |c| render(c, |r| r.checkpoint.is_some())),
@@ -31,6 +30,7 @@ fn estimator(command: &Command, uses: fn(&EstimatorArgs) -> bool) -> bool {
     match command {
         Command::Render(args) => uses(&args.estimator),
         Command::Bench(args) => uses(&args.estimator),
+        Command::Watch(args) => uses(&args.job.estimator),
         _ => false,
     }
 }

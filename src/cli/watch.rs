@@ -1,11 +1,157 @@
-//! `sunfleck watch`: the shader dev loop. Not built yet; its arguments are taken as they come.
+//! `sunfleck watch`: the shader loop. The hidden `watch-worker` is the process that renders for it.
+
+use std::ffi::OsString;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+use std::time::Duration;
 
 use clap::Args;
+use sunfleck::render::{Settings, choose_camera};
+use sunfleck::watch::messages::View;
+use sunfleck::watch::session::{self, Options, Serving};
+use sunfleck::watch::worker;
+use sunfleck::{Error, Result};
 
-/// Render again whenever a shader changes, with a live page in the browser.
-#[derive(Args, Debug)]
+use super::estimator_args::EstimatorArgs;
+use super::parse;
+use super::render::load_scene;
+use super::tone_args::ToneArgs;
+
+const EXAMPLES: &str = "\
+Examples:
+  sunfleck shaders export my-shaders
+  sunfleck watch --shaders my-shaders                the Cornell box; open the address that is printed
+  sunfleck watch scene.gltf --resolution 800x600     reloads the scene when one of its files changes
+  sunfleck watch --shaders my-shaders --no-serve     one line for each save, no page
+  ssh -L 8417:127.0.0.1:8417 HOST                    to see the page of a machine far away";
+
+/// The port if none is asked for, and it is free.
+const PORT: u16 = 8417;
+
+/// Render again whenever a shader or the scene changes, with a live page in the browser.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct WatchArgs {
-    /// A scene, and flags.
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    arguments: Vec<String>,
+    #[command(flatten)]
+    pub(super) job: WorkerArgs,
+    #[command(flatten)]
+    tone: ToneArgs,
+    /// Port of the page [default: 8417, or any that is free].
+    #[arg(long, value_name = "N", help_heading = "Page")]
+    port: Option<u16>,
+    /// Address to listen on. Beyond 127.0.0.1 the page needs the token that is printed.
+    #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Page")]
+    bind: IpAddr,
+    /// No page: one line in the terminal for each save.
+    #[arg(long, conflicts_with_all = ["port", "bind"], help_heading = "Page")]
+    no_serve: bool,
+    /// Replace the process that renders if it is silent for so long.
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = parse::duration, help_heading = "Device")]
+    hang: Duration,
+}
+
+/// What the process that renders must know.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct WorkerArgs {
+    /// A .gltf, .glb or .obj file, or the name of a built-in scene.
+    #[arg(default_value = "cornell")]
+    scene: String,
+    /// Width and height of the image in pixels.
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = parse::resolution, help_heading = "Image")]
+    resolution: (u32, u32),
+    /// Camera of the scene, by name or index [default: the first].
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "Image")]
+    camera: Option<String>,
+    /// Samples per pixel, after which the picture is finished and nothing runs.
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..), help_heading = "How long")]
+    spp: u32,
+    #[command(flatten)]
+    pub(super) estimator: EstimatorArgs,
+}
+
+impl WorkerArgs {
+    fn words(&self) -> Vec<String> {
+        let (width, height) = self.resolution;
+        let mut words = vec![format!("--resolution={width}x{height}")];
+        if self.estimator.seed != 0 {
+            words.push(format!("--seed={}", self.estimator.seed));
+        }
+        words.extend(self.estimator.render_flags());
+        words
+    }
+
+    fn settings(&self) -> Result<(Settings, super::estimator_args::EnvironmentArgs)> {
+        let (width, height) = self.resolution;
+        let mut settings =
+            Settings { width, height, spp: self.spp, camera: self.camera.clone(), ..Settings::default() };
+        let environment = self.estimator.clone().apply(&mut settings)?;
+        Ok((settings, environment))
+    }
+}
+
+/// Watches until Ctrl-C.
+pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
+    let (settings, environment) = args.job.settings()?;
+    // What is wrong with the scene is best said before anything starts; and the camera's index is its.
+    let scene = load_scene(&args.job.scene, &environment, true)?;
+    let camera = choose_camera(&scene, settings.camera.as_deref())?;
+    drop(scene);
+    let serving = if args.no_serve { None } else { Some(listen(args)?) };
+    if let Some(serving) = &serving {
+        let query = serving.token.as_ref().map_or_else(String::new, |token| format!("/?token={token}"));
+        eprintln!("page: http://{}{query}", serving.address);
+    }
+    let words = args.job.words();
+    let quoted: Vec<_> = words.iter().map(|word| shlex::try_quote(word).unwrap_or_default().into_owned()).collect();
+    let scene = shlex::try_quote(&args.job.scene).unwrap_or_default().into_owned();
+    // The server compiles: the worker starts with the embedded kernel, which is always good.
+    let worker = words.iter().filter(|word| !word.starts_with("--shaders=")).map(OsString::from);
+    let mut worker_arguments: Vec<OsString> = vec!["watch-worker".into()];
+    worker_arguments.extend(worker);
+    worker_arguments.extend([format!("--spp={}", args.job.spp).into(), "--".into(), args.job.scene.clone().into()]);
+    let options = Options {
+        scene: args.job.scene.clone(),
+        environment: environment.file,
+        shaders: settings.shaders_dir,
+        worker_arguments,
+        view: View {
+            camera,
+            integrator: settings.integrator.name().to_owned(),
+            exposure: args.tone.exposure,
+            tonemap: args.tone.tonemap.to_string(),
+            ..View::default()
+        },
+        command: format!("sunfleck render {scene} {}", quoted.join(" ")),
+        hang: args.hang,
+    };
+    Ok(session::run(options, serving)?)
+}
+
+/// Renders for the server at the other end of standard input and output.
+pub(crate) fn run_worker(args: &WorkerArgs) -> anyhow::Result<()> {
+    let (settings, environment) = args.settings()?;
+    let load = || load_scene(&args.scene, &environment, true).map_err(|error| format!("{error:#}"));
+    match worker::run(settings, &load) {
+        // The server is gone.
+        Err(Error::Interrupted) => Ok(()),
+        result => Ok(result?),
+    }
+}
+
+fn listen(args: &WatchArgs) -> Result<Serving> {
+    let bind = |port| TcpListener::bind(SocketAddr::new(args.bind, port));
+    let listener = match args.port {
+        Some(port) => bind(port),
+        None => bind(PORT).or_else(|_| bind(0)),
+    };
+    let failed = |e| Error::Usage(format!("cannot listen on {} port {}: {e}", args.bind, args.port.unwrap_or(PORT)));
+    let listener = listener.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    let token = if args.bind.is_loopback() { None } else { Some(new_token()?) };
+    Ok(Serving { listener, address, token })
+}
+
+fn new_token() -> Result<String> {
+    let mut bytes = [0_u8; 16];
+    getrandom::fill(&mut bytes).map_err(|e| Error::Usage(format!("there is no randomness for a token: {e}")))?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }

@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use image::codecs::png::PngEncoder;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::output::write_atomically;
@@ -43,4 +43,20 @@ pub fn write_png(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Re
             .map_err(|e| io::Error::other(e.to_string()))?;
         writer.flush()
     })
+}
+
+/// A PNG file's bytes, made fast rather than small.
+///
+/// # Errors
+/// What the encoder says, as of an image without pixels.
+///
+/// # Panics
+/// If the number of pixels is not `width` × `height`.
+pub fn encode_png(width: u32, height: u32, pixels: &[[u8; 3]]) -> std::result::Result<Vec<u8>, String> {
+    assert_eq!(pixels.len(), width as usize * height as usize, "an image has width × height pixels");
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub)
+        .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|e| e.to_string())?;
+    Ok(bytes)
 }

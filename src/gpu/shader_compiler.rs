@@ -45,8 +45,7 @@ pub fn compile(sources: &Sources, file: &str, defines: &[(&str, String)]) -> Res
         options.add_macro_definition(name, Some(value));
     }
     options.set_include_callback(|requested, _, from, _| {
-        let folder = from.rsplit_once('/').map_or("", |(folder, _)| folder);
-        let name = join(folder, requested);
+        let name = resolve_include(from, requested);
         match sources.get(&name) {
             Some(content) => Ok(shaderc::ResolvedInclude { resolved_name: name, content: content.clone() }),
             None => Err(format!("'{requested}', included from {from}, does not exist")),
@@ -56,6 +55,11 @@ pub fn compile(sources: &Sources, file: &str, defines: &[(&str, String)]) -> Res
         .compile_into_spirv(source, shaderc::ShaderKind::Compute, file, "main", Some(&options))
         .map_err(|e| error(with_source_lines(sources, &e.to_string())))?;
     Ok(artifact.as_binary().to_vec())
+}
+
+/// The file that `requested` means in an `#include` of the file `from`.
+pub fn resolve_include(from: &str, requested: &str) -> String {
+    join(from.rsplit_once('/').map_or("", |(folder, _)| folder), requested)
 }
 
 /// The compiler's messages; below each that names a file and a line stands that line.

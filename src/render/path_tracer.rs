@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk::BufferUsageFlags as Usage;
+use glam::DVec3;
 
 use super::bake::{Bake, BakeReport};
 use super::kernel_key::KernelKey;
@@ -92,9 +93,7 @@ impl PathTracer {
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut key = KernelKey::new(prepared, camera, settings, trace, form);
-        let bake = Bake::choose(prepared, gpu.info.kind, trace, settings.bake && !overrides.driver_specializes);
-        let spirv;
-        (spirv, key.baked) = bake.apply(kernel_spirv(&key, settings)?);
+        let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
@@ -106,7 +105,7 @@ impl PathTracer {
             slices,
             buffers,
             overrides,
-            bake: bake.report(key.baked),
+            bake,
             compile_seconds,
             upload_seconds,
         })
@@ -120,6 +119,31 @@ impl PathTracer {
     /// What of the scene is compiled in.
     pub fn bake_report(&self) -> &BakeReport {
         &self.bake
+    }
+
+    /// Builds the kernel anew, for other settings or shaders, and keeps the scene on the device. `prepared` is the scene
+    /// that was uploaded. On an error the tracer is as it was.
+    ///
+    /// # Errors
+    /// A shader that does not compile, a lost device.
+    pub fn rebuild(&mut self, gpu: &Arc<Gpu>, prepared: &Prepared, camera: &Camera, settings: &Settings) -> Result<()> {
+        let start = Instant::now();
+        let form = (self.key.array_form, self.key.chunk_shift);
+        let mut key = KernelKey::new(prepared, camera, settings, self.key.trace, form);
+        let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
+        let kernel =
+            build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &self.constants_buffer, &self.slices)?;
+        self.slices[0].warm_up(&kernel)?;
+        (self.key, self.kernel, self.bake) = (key, kernel, bake);
+        self.constants.max_bounces = effective_max_bounces(settings);
+        self.constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
+        self.compile_seconds = start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Looks through another camera of the same kind (lens, projection), on a film of another size.
+    pub fn look_through(&mut self, camera: &Camera, origin: DVec3, width: u32, height: u32) {
+        camera_constants(camera, origin, width, height, &mut self.constants);
     }
 
     /// Bytes of device memory in use.
@@ -246,6 +270,20 @@ fn effective_max_bounces(settings: &Settings) -> u32 {
     settings.max_bounces.unwrap_or(u32::MAX).min(needed)
 }
 
+/// The kernel with what of the scene is to be compiled in; the key says so from then on.
+fn baked_spirv(
+    gpu: &Gpu,
+    prepared: &Prepared,
+    settings: &Settings,
+    overrides: BindingOverride,
+    key: &mut KernelKey,
+) -> Result<(Vec<u32>, BakeReport)> {
+    let bake = Bake::choose(prepared, gpu.info.kind, key.trace, settings.bake && !overrides.driver_specializes);
+    let (spirv, baked) = bake.apply(kernel_spirv(key, settings)?);
+    key.baked = baked;
+    Ok((spirv, bake.report(baked)))
+}
+
 fn build_kernel(
     gpu: &Arc<Gpu>,
     key: &KernelKey,
@@ -286,8 +324,11 @@ fn build_kernel(
     )?)
 }
 
-/// The embedded variant, or one compiled from `--shaders`.
+/// What the shader loop has compiled, else the embedded variant, or one compiled from `--shaders`.
 fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
+    if let Some(spirv) = &settings.kernel_spirv {
+        return Ok(spirv.to_vec());
+    }
     let Some(folder) = &settings.shaders_dir else {
         let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
         return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());

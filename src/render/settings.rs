@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::film::Film;
@@ -62,6 +63,9 @@ pub struct Settings {
     pub device: DeviceChoice,
     /// A folder whose shader sources replace the embedded ones.
     pub shaders_dir: Option<PathBuf>,
+    /// The kernel's SPIR-V, compiled already for the trace back end and the array form that will be chosen; it goes before
+    /// `shaders_dir`. The shader loop sets it.
+    pub kernel_spirv: Option<Arc<[u32]>>,
     /// A camera of the scene by name or index; `None` is the first.
     pub camera: Option<String>,
     /// Refuse to succeed with a result that is not trustworthy.
@@ -94,6 +98,7 @@ impl Default for Settings {
             trace: TraceChoice::default(),
             device: DeviceChoice::default(),
             shaders_dir: None,
+            kernel_spirv: None,
             camera: None,
             strict: false,
         }

@@ -3,3 +3,4 @@
 mod bench;
 mod images;
 mod usage;
+mod watch;

@@ -83,8 +83,8 @@ fn impossible_combinations_are_usage_errors() {
 #[test]
 fn what_is_not_built_is_refused_by_name() {
     for (arguments, name) in [
-        (&["watch", "cornell"] as &[&str], "watch"),
-        (&["bench", "--device", "all"], "--device all"),
+        (&["bench", "--device", "all"] as &[&str], "--device all"),
+        (&["watch", "--device", "all"], "--device all"),
         (&["render", "--aov", "albedo,normal"], "--aov"),
         (&["render", "--denoise"], "--denoise"),
         (&["render", "--checkpoint", "c"], "--checkpoint"),
@@ -111,8 +111,12 @@ fn help_names_everything_of_the_contract_and_marks_what_is_not_built() {
         assert!(help.contains(flag), "{flag}");
     }
     assert!(help.contains("Denoise the image [not built yet]"), "{help}");
+    let (_, help, _) = run_in(here, &["watch", "--help"]);
+    for flag in "--shaders --port --bind --no-serve --resolution --spp --hang --exposure".split_whitespace() {
+        assert!(help.contains(flag), "{flag}");
+    }
     let (_, help, _) = run_in(here, &["--help"]);
-    for command in ["render", "devices", "info", "compare", "merge", "bench", "watch", "Exit codes"] {
+    for command in ["render", "devices", "info", "compare", "merge", "bench", "watch", "shaders", "Exit codes"] {
         assert!(help.contains(command), "{command}");
     }
     let (code, version, _) = run_in(here, &["--version"]);

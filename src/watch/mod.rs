@@ -1,0 +1,19 @@
+//! The shader loop of `sunfleck watch`: a saved file becomes a new picture, or the compiler's message at its line.
+//!
+//! Two processes. The **server** ([`session`]) watches files, compiles shaders to SPIR-V, and shows the page. The **worker**
+//! ([`worker`]) has the device and renders; a kernel that hangs or kills the device takes only the worker along, which is
+//! replaced and goes on with the last good kernel. They speak by [`wire`] over the worker's standard input and output.
+
+pub mod diagnostic;
+pub mod guard;
+pub mod hub;
+pub mod includes;
+pub mod messages;
+mod report;
+pub mod scene_files;
+pub mod server;
+pub mod session;
+mod supervisor;
+mod tracked;
+pub mod wire;
+pub mod worker;

@@ -1,0 +1,197 @@
+// Drives the page of `sunfleck watch` in headless Chromium, as a person would: load, edit, break, mend, drag, compare,
+// inspect, save. Needs node and playwright-core (NODE_PATH or a node_modules above) and a chromium.
+//   node tests/e2e/watch.mjs [SUNFLECK] [SCREENSHOT_FOLDER]
+
+import assert from "node:assert/strict";
+import { spawn, spawnSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { get } from "node:http";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const { chromium } = createRequire(import.meta.url)("playwright-core");
+const sunfleck = process.argv[2] ?? "target/release/sunfleck";
+const screenshots = process.argv[3];
+const folder = mkdtempSync(join(tmpdir(), "sunfleck-e2e-"));
+const shaders = join(folder, "shaders");
+const leaf = join(shaders, "include", "bsdf_lambertian.glsl");
+const figures = {};
+
+assert.equal(spawnSync(sunfleck, ["shaders", "export", shaders]).status, 0, "shaders export");
+const original = readFileSync(leaf, "utf8");
+const child = spawn(sunfleck, ["watch", "cornell", "--shaders", shaders, "--port", "0", "--spp", "64", "--resolution", process.env.SUNFLECK_E2E_RESOLUTION ?? "256x256"], { stdio: ["ignore", "ignore", "pipe"] });
+let log = "";
+const address = await new Promise((resolve, reject) => {
+  child.stderr.on("data", (data) => {
+    log += data;
+    const found = log.match(/page: (\S+)\n/);
+    if (found) resolve(found[1]);
+  });
+  child.on("exit", () => reject(new Error(`sunfleck has ended:\n${log}`)));
+});
+
+const status = (path, headers) => new Promise((resolve, reject) => {
+  get(address + path, { headers }, (answer) => resolve(answer.resume().statusCode)).on("error", reject);
+});
+
+const step = async (name, work) => {
+  const start = performance.now();
+  await work();
+  figures[name] = Math.round(performance.now() - start);
+  console.log(`ok  ${name} (${figures[name]} ms)`);
+};
+
+let browser;
+try {
+  browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+  const page = await browser.newPage({ viewport: { width: 1280, height: 900 }, acceptDownloads: true });
+  const errors = [];
+  const hosts = new Set();
+  page.on("pageerror", (error) => errors.push(error.message));
+  page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
+  page.on("request", (request) => hosts.add(new URL(request.url()).host));
+  const shot = async (name) => screenshots && page.screenshot({ path: join(screenshots, `${name}.png`) });
+  const mean = () => page.evaluate(() => {
+    const canvas = document.getElementById("picture");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let sum = [0, 0, 0];
+    for (let i = 0; i < data.length; i += 4) for (let c = 0; c < 3; c++) sum[c] += data[i + c];
+    return sum.map((s) => (4 * s) / data.length);
+  });
+  const finished = () => page.waitForFunction(() => document.getElementById("stage").textContent === "finished", null, { timeout: 120000 });
+  const edit = (n) => page.waitForFunction((n) => Number(document.body.dataset.edit) >= n, n, { timeout: 60000 });
+  const frames = () => page.evaluate(() => Number(document.body.dataset.frames ?? 0));
+
+  await step("load and see pixels", async () => {
+    await page.goto(address);
+    await page.waitForFunction(() => Number(document.body.dataset.frames) > 0, null, { timeout: 60000 });
+    const [r, g, b] = await mean();
+    assert(r > 20 && g > 20 && b > 20, `${[r, g, b]}`);
+  });
+  await step("finish", finished);
+  await shot("large");
+  const before = await mean();
+
+  await step("freeze A", async () => {
+    await page.keyboard.press("f");
+    await page.waitForFunction(() => !document.getElementById("compare").disabled);
+  });
+  await step("edit a leaf: first new image", async () => {
+    writeFileSync(leaf, original.replaceAll("p.color", "p.color.gbr"));
+    await edit(1);
+  });
+  const edited = await mean();
+  assert(Math.abs(edited[0] / edited[2] - before[0] / before[2]) > 0.1, `the picture is another: ${before} ${edited}`);
+  await step("break: error on the page", async () => {
+    writeFileSync(leaf, `${original}\nfloat broken() { return undeclared_name; }\n`);
+    await page.waitForFunction(() => document.getElementById("problems").textContent.includes("undeclared_name"));
+  });
+  const problem = await page.textContent("#problems");
+  const line = original.split("\n").length + 1;
+  assert(problem.includes(`include/bsdf_lambertian.glsl:${line}:`), problem);
+  assert(problem.includes("float broken()"), problem);
+  await shot("error");
+  await step("mend", async () => {
+    writeFileSync(leaf, original);
+    await page.waitForFunction(() => document.getElementById("problems").hidden, null, { timeout: 60000 });
+    await edit(2);
+    const mended = await mean();
+    assert(Math.abs(mended[0] / mended[2] - before[0] / before[2]) < 0.1, `as before: ${before} ${mended}`);
+  });
+  // SUNFLECK_E2E_EDITS=20 measures as many edits: medians from the save to the error, and to the first new image.
+  const times = { error: [], image: [] };
+  for (let i = 0; i < Number(process.env.SUNFLECK_E2E_EDITS ?? 0); i++) {
+    let start = performance.now();
+    writeFileSync(leaf, `${original}\nfloat broken() { return undeclared_${i}; }\n`);
+    await page.waitForFunction((i) => document.getElementById("problems").textContent.includes(`undeclared_${i}`), i);
+    times.error.push(performance.now() - start);
+    const before = await page.evaluate(() => document.body.dataset.edit);
+    start = performance.now();
+    writeFileSync(leaf, original.replaceAll("p.color", `(p.color * ${1 - i / 100})`));
+    await page.waitForFunction((before) => document.body.dataset.edit !== before, before, { timeout: 60000 });
+    times.image.push(performance.now() - start);
+  }
+  for (const [name, list] of Object.entries(times)) {
+    if (list.length > 0) figures[`save to ${name}, median`] = Math.round(list.sort((a, b) => a - b)[list.length >> 1]);
+  }
+  writeFileSync(leaf, original);
+
+  await step("switch the integrator", async () => {
+    await page.selectOption("#integrator", "emission");
+    await page.waitForFunction(() => document.getElementById("command").textContent.includes("--integrator=emission"));
+    await page.waitForTimeout(1500);
+    await finished();
+    const dark = await mean();
+    assert(dark[0] < before[0] / 2, `${before} ${dark}`);
+    await page.selectOption("#integrator", "path");
+    await page.waitForTimeout(1500);
+  });
+  await finished();
+  await step("drag the camera", async () => {
+    const count = await frames();
+    const start = performance.now();
+    const box = await page.locator("#picture").boundingBox();
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    for (let i = 0; i < 60; i++) {
+      await page.mouse.move(box.x + box.width / 2 + 2 * i, box.y + box.height / 2 + i / 2);
+      await page.waitForTimeout(25);
+    }
+    figures["images per second in a drag"] = ((await frames()) - count) / ((performance.now() - start) / 1000);
+    await page.mouse.up();
+    await page.waitForTimeout(500);
+  });
+  await finished();
+  await step("wipe and difference", async () => {
+    await page.keyboard.press("w");
+    await shot("wipe");
+    assert.equal(await page.inputValue("#compare"), "wipe");
+    await page.keyboard.press("d");
+    const difference = await mean();
+    assert(difference[0] > 1 && difference[0] < 200, `${difference}`);
+    await page.keyboard.press("h");
+    await shot("heat");
+    await page.keyboard.press("b");
+  });
+  await step("inspect a pixel", async () => {
+    await page.locator("#picture").click({ position: { x: 200, y: 200 } });
+    await page.waitForFunction(() => document.getElementById("pixel-samples").textContent === "64");
+    const radiance = (await page.textContent("#pixel-radiance")).trim().split(/\s+/).map(Number);
+    assert(radiance.length === 3 && radiance.every((c) => c >= 0), `${radiance}`);
+  });
+  await step("save", async () => {
+    for (const [button, magic] of [["#png", "89504e47"], ["#exr", "762f3101"]]) {
+      const [download] = await Promise.all([page.waitForEvent("download"), page.click(button)]);
+      const file = join(folder, download.suggestedFilename());
+      await download.saveAs(file);
+      assert.equal(readFileSync(file).subarray(0, 4).toString("hex"), magic);
+    }
+  });
+  await step("a small and a dark window", async () => {
+    await page.setViewportSize({ width: 390, height: 844 });
+    await page.emulateMedia({ colorScheme: "dark" });
+    await page.waitForTimeout(300);
+    await shot("small-dark");
+    await page.setViewportSize({ width: 1600, height: 1000 });
+    await page.waitForTimeout(300);
+    await shot("large-dark");
+    const overflow = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
+    assert(!overflow, "the page scrolls sideways");
+  });
+  await step("strangers are refused", async () => {
+    assert.equal(await status("/", { Host: "evil.example" }), 403);
+    assert.equal(await status("/socket", { Origin: "http://evil.example" }), 403);
+    assert.equal(await status("/../Cargo.toml", {}), 404);
+  });
+  assert.deepEqual(errors, [], "errors in the console");
+  assert.deepEqual([...hosts].filter((host) => host && host !== new URL(address).host), [], "requests to other hosts");
+  console.log(JSON.stringify(figures));
+} catch (error) {
+  console.error(log);
+  throw error;
+} finally {
+  await browser?.close();
+  child.kill();
+  rmSync(folder, { recursive: true, force: true });
+}
