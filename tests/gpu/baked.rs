@@ -2,6 +2,7 @@
 //! closed, images are the same, and what is not compiled in is said.
 
 use crate::common::brute_force::{check, world_triangles};
+use crate::common::builder::rectangle;
 use crate::common::gpu;
 use crate::common::kernel::{Random, TestKernel};
 use crate::common::scenes::scene;
@@ -199,4 +200,10 @@ fn the_rule_says_why() {
     assert!(!choose(&cornell, TraceBackend::RayQuery, true).has_geometry());
     let instances = choose(&prepare("instances"), TraceBackend::Bvh, true);
     assert!(!instances.has_geometry(), "{}", instances.reason);
+    // A speck of 10⁻⁴ in a room of 2: distances across the room would not tell its sides from each other.
+    let mut speck = scene("cornell");
+    speck.meshes[0].primitives.push(rectangle(DVec3::ZERO, DVec3::X * 1e-4, DVec3::Y * 1e-4, 0));
+    let speck = prepare_scene(&speck, &speck.cameras[0], &gpu::settings(16, 16)).expect("the scene fits");
+    let speck = choose(&speck, TraceBackend::Bvh, true);
+    assert!(!speck.has_geometry() && speck.reason.contains("4096th"), "{}", speck.reason);
 }

@@ -73,7 +73,9 @@ fn who_specializes_does_not_change_a_bit() {
     }
     for name in some(&["textured", "cornell_spheres", "volumes", "environment", "punctual"]) {
         let by_driver = BindingOverride { driver_specializes: true, ..BindingOverride::default() };
-        let [ours, driver] = [BindingOverride::default(), by_driver].map(|o| bits(&film(name, &settings(), o, 0..16)));
+        // A search that is compiled in rounds differently, and only our own specialisation compiles one in.
+        let unbaked = Settings { bake: false, ..settings() };
+        let [ours, driver] = [BindingOverride::default(), by_driver].map(|o| bits(&film(name, &unbaked, o, 0..16)));
         assert_eq!(ours, driver, "{name}");
     }
 }
