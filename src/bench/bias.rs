@@ -61,7 +61,7 @@ pub struct Region {
 ///
 /// Where light comes from few bright samples, a short run may have met none of them: then its mean is low, and its variance,
 /// which is taken from it, far too low. The reference has met them, and its variance says what they do to fewer samples; see
-/// [`expected_of_fewer`].
+/// `expected_of_fewer`.
 ///
 /// # Panics
 /// If the sizes differ or are zero.
