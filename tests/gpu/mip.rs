@@ -372,7 +372,7 @@ fn scattered_light_stays_the_same() {
     scene.images.push(Image { name: String::from("squares"), width: 256, height: 256, texels });
     scene.textures.push(texture(0));
     let side = 32;
-    let (seeds, spp) = if scenes::slow_driver() { (8, 32) } else { (24, 128) };
+    let (seeds, spp) = if scenes::slow_driver() { (16, 64) } else { (24, 128) };
     let [mip, plain]: [TileStatistics; 2] = [true, false].map(|mip| {
         let settings = Settings { mip, ..gpu::settings(side, side) };
         // Seeds of their own: the test is one of independent images.
