@@ -4,7 +4,7 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use sunfleck::layout::NONE;
 
 use super::kernel::TestKernel;
-use super::trace::{Hit, NO_TRIANGLE, Ray, TriangleId};
+use super::trace::{Hit, NO_TRIANGLE, Ray, TriangleId, trace};
 
 const ROUNDING: f64 = 1.0 / 16_777_216.0;
 
@@ -117,4 +117,31 @@ pub fn check(triangles: &[Triangle], ray: &Ray, hit: &Hit) {
         let missed = m.t * length + m.hit_error < nearest_allowed;
         assert!(!missed, "{:?} at {} was missed: {}", triangle.id, m.t, context());
     }
+}
+
+/// The hits of the rays are those of the loop, and again with the nearest triangle left out at the start or at the end, or
+/// with an end before or behind it. Returns how many rays hit something.
+pub fn assert_agrees(kernel: &TestKernel, rays: &[Ray]) -> usize {
+    let triangles = world_triangles(kernel);
+    let hits = trace(kernel, rays);
+    rays.iter().zip(&hits).for_each(|(ray, hit)| check(&triangles, ray, hit));
+    let mut again = rays.to_vec();
+    for (i, (ray, hit)) in again.iter_mut().zip(&hits).enumerate() {
+        match i % 5 {
+            0 => ray.from = hit.triangle,
+            // A ray ends at the triangle that it aims at.
+            1 => (ray.towards, ray.t_max) = (hit.triangle, (hit.t as f32).next_up()),
+            2 => ray.t_max = (hit.t * 0.99) as f32,
+            3 => (ray.t_max, ray.any_hit) = ((hit.t * 1.01) as f32, true),
+            _ => (ray.from, ray.any_hit) = (hit.triangle, true),
+        }
+    }
+    let second = trace(kernel, &again);
+    again.iter().zip(&second).for_each(|(ray, hit)| check(&triangles, ray, hit));
+    for ((ray, first), second) in again.iter().zip(&hits).zip(&second).filter(|(t, _)| t.1.triangle != NO_TRIANGLE) {
+        let same = first.triangle == second.triangle;
+        let excluded = ray.from == first.triangle || ray.towards == first.triangle || ray.t_max < first.t as f32;
+        assert!(!(same && excluded), "{ray:?}: {second:?}");
+    }
+    hits.iter().filter(|hit| hit.triangle != NO_TRIANGLE).count()
 }

@@ -9,7 +9,7 @@ use sunfleck::scene::{Instance, Material, Mesh, Primitive, Scene};
 use super::gpu;
 use super::kernel::{Random, TestKernel, empty_scene, floats, vector_texel};
 
-/// A slot and its instance.
+/// A triangle's number and its instance.
 pub type TriangleId = [u32; 2];
 pub const NO_TRIANGLE: TriangleId = [u32::MAX; 2];
 
@@ -180,6 +180,54 @@ pub fn rays_at_edges(mesh: &Primitive, place: &DAffine3, origin: DVec3, count: u
         Ray::new(from.as_dvec3(), if i.is_multiple_of(3) { direction } else { direction.normalize() })
     };
     (0..count).map(&mut ray).collect()
+}
+
+/// Rays from anywhere to anywhere; some run along an axis or in a plane, and lengths differ.
+pub fn random_rays(mut random: Random, count: usize, origin: DVec3) -> Vec<Ray> {
+    let mut ray = |i: usize| {
+        let mut direction = random.direction();
+        if i.is_multiple_of(7) {
+            direction.x = 0.0;
+        }
+        if i.is_multiple_of(21) {
+            direction = DVec3::Y * direction.y.signum();
+        }
+        Ray::new(random.point(3.0) - origin, direction * 10.0_f64.powf(random.between(-3.0, 3.0)))
+    };
+    (0..count).map(&mut ray).collect()
+}
+
+/// None of `count` rays from inside of a closed mesh leaves it; half of them are shadow rays.
+pub fn assert_watertight(kernel: &TestKernel, mesh: &Primitive, place: &DAffine3, count: usize) {
+    let mut rays = rays_at_edges(mesh, place, kernel.prepared.origin, count);
+    rays.iter_mut().skip(count / 2).for_each(|ray| ray.any_hit = true);
+    let hits = trace(kernel, &rays);
+    let leaks: Vec<&Ray> =
+        rays.iter().zip(&hits).filter(|(_, hit)| hit.triangle == NO_TRIANGLE).map(|(ray, _)| ray).collect();
+    assert!(leaks.is_empty(), "{} of {count} rays leave {place:?}: {:?}", leaks.len(), leaks[0]);
+}
+
+/// Rays along every axis, both ways, from `across`³ points of a grid within the unit cube.
+pub fn axis_parallel_rays(across: usize, origin: DVec3) -> Vec<Ray> {
+    let middle = (across - 1) as f64 / 2.0;
+    let grid =
+        |i: usize| [i % across, i / across % across, i / across.pow(2)].map(|k| (k as f64 - middle) / (middle + 1.0));
+    let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+    (0..across.pow(3)).flat_map(|i| axes.map(|axis| Ray::new(DVec3::from(grid(i)) - origin, axis))).collect()
+}
+
+/// Every ray ends on the wall of the unit cube.
+pub fn assert_end_on_unit_cube(kernel: &TestKernel, rays: &[Ray]) {
+    for (ray, hit) in rays.iter().zip(trace(kernel, rays)) {
+        assert!(hit.triangle != NO_TRIANGLE, "{ray:?} leaks");
+        let end = (ray.origin + ray.direction * hit.t + kernel.prepared.origin).dot(ray.direction);
+        assert!((end - 1.0).abs() < 1e-6, "{ray:?} ends at {end}");
+    }
+}
+
+/// The same rays as shadow rays.
+pub fn as_shadow_rays(rays: &[Ray]) -> Vec<Ray> {
+    rays.iter().map(|ray| Ray { any_hit: true, ..*ray }).collect()
 }
 
 /// A software driver's ray query (lavapipe 25: 0.4 % of the rays that are aimed at edges) misses where a box test rounds; our

@@ -1,13 +1,16 @@
 //! Scenes that are compiled into the kernel: the search finds what a loop over all triangles finds, closed meshes stay
 //! closed, images are the same, and what is not compiled in is said.
 
-use crate::common::brute_force::{check, world_triangles};
+use crate::common::brute_force::assert_agrees;
 use crate::common::builder::rectangle;
 use crate::common::gpu;
 use crate::common::kernel::{Random, TestKernel};
 use crate::common::scenes::scene;
 use crate::common::spirv::{assert_valid, bytes, validator_is_there, words};
-use crate::common::trace::{NO_TRIANGLE, Ray, cube, icosphere, kernel, rays_at_edges, scene_of, soup, trace};
+use crate::common::trace::{
+    NO_TRIANGLE, Ray, as_shadow_rays, assert_end_on_unit_cube, assert_watertight, axis_parallel_rays, cube, icosphere,
+    kernel, random_rays, scene_of, soup, trace,
+};
 use glam::{DAffine3, DVec3};
 use sunfleck::gpu::specialize::{bake, specialize};
 use sunfleck::gpu::{DeviceKind, TraceBackend, embedded};
@@ -26,49 +29,13 @@ fn one(mesh: Primitive) -> Scene {
     scene_of(vec![(mesh, vec![DAffine3::IDENTITY])])
 }
 
-fn random_rays(count: usize, origin: DVec3) -> Vec<Ray> {
-    let mut random = Random(31);
-    let mut ray = |i: usize| {
-        let mut direction = random.direction();
-        if i.is_multiple_of(7) {
-            direction.x = 0.0;
-        }
-        if i.is_multiple_of(21) {
-            direction = DVec3::Y * direction.y.signum();
-        }
-        Ray::new(random.point(3.0) - origin, direction * 10.0_f64.powf(random.between(-3.0, 3.0)))
-    };
-    (0..count).map(&mut ray).collect()
-}
-
 #[test]
 fn hits_agree_with_brute_force() {
     let cases = [soup(&mut Random(30), 40), cube(2), icosphere(1)];
     for mesh in cases {
         let kernel = baked(&one(mesh));
-        let triangles = world_triangles(&kernel);
-        let rays = random_rays(4096, kernel.prepared.origin);
-        let hits = trace(&kernel, &rays);
-        rays.iter().zip(&hits).for_each(|(ray, hit)| check(&triangles, ray, hit));
-        assert!(hits.iter().filter(|hit| hit.triangle != NO_TRIANGLE).count() > rays.len() / 64);
-        // The same with the nearest triangle left out at the start or at the end, or with an end before or behind it.
-        let mut again = rays.clone();
-        for (i, (ray, hit)) in again.iter_mut().zip(&hits).enumerate() {
-            match i % 5 {
-                0 => ray.from = hit.triangle,
-                1 => (ray.towards, ray.t_max) = (hit.triangle, (hit.t as f32).next_up()),
-                2 => ray.t_max = (hit.t * 0.99) as f32,
-                3 => (ray.t_max, ray.any_hit) = ((hit.t * 1.01) as f32, true),
-                _ => (ray.from, ray.any_hit) = (hit.triangle, true),
-            }
-        }
-        let second = trace(&kernel, &again);
-        again.iter().zip(&second).for_each(|(ray, hit)| check(&triangles, ray, hit));
-        for ((ray, first), second) in again.iter().zip(&hits).zip(&second).filter(|(t, _)| t.1.triangle != NO_TRIANGLE)
-        {
-            let excluded = ray.from == first.triangle || ray.towards == first.triangle || ray.t_max < first.t as f32;
-            assert!(!(first.triangle == second.triangle && excluded), "{ray:?}: {second:?}");
-        }
+        let rays = random_rays(Random(31), 4096, kernel.prepared.origin);
+        assert!(assert_agrees(&kernel, &rays) > rays.len() / 64);
     }
 }
 
@@ -86,12 +53,7 @@ fn closed_meshes_are_watertight() {
     ];
     for (mesh, place) in cases {
         let kernel = baked(&scene_of(vec![(mesh.clone(), vec![place])]));
-        let mut rays = rays_at_edges(&mesh, &place, kernel.prepared.origin, RAYS);
-        rays.iter_mut().skip(RAYS / 2).for_each(|ray| ray.any_hit = true);
-        let hits = trace(&kernel, &rays);
-        let leaks: Vec<&Ray> =
-            rays.iter().zip(&hits).filter(|(_, hit)| hit.triangle == NO_TRIANGLE).map(|(ray, _)| ray).collect();
-        assert!(leaks.is_empty(), "{} of {RAYS} rays leave {place:?}: {:?}", leaks.len(), leaks[0]);
+        assert_watertight(&kernel, &mesh, &place, RAYS);
     }
 }
 
@@ -99,17 +61,9 @@ fn closed_meshes_are_watertight() {
 #[test]
 fn axis_parallel_rays_do_not_leak() {
     let kernel = baked(&one(cube(3)));
-    let grid = |i: usize| [i % 11, i / 11 % 11, i / 121].map(|k| (k as f64 - 5.0) / 6.0);
-    let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
-    let from = |i| DVec3::from(grid(i)) - kernel.prepared.origin;
-    let mut rays: Vec<Ray> = (0..11 * 11 * 11).flat_map(|i| axes.map(|axis| Ray::new(from(i), axis))).collect();
-    let any: Vec<Ray> = rays.iter().map(|ray| Ray { any_hit: true, ..*ray }).collect();
-    rays.extend(any);
-    for (ray, hit) in rays.iter().zip(trace(&kernel, &rays)) {
-        assert!(hit.triangle != NO_TRIANGLE, "{ray:?} leaks");
-        let end = (ray.origin + ray.direction * hit.t + kernel.prepared.origin).dot(ray.direction);
-        assert!((end - 1.0).abs() < 1e-6, "{ray:?} ends at {end}");
-    }
+    let mut rays = axis_parallel_rays(11, kernel.prepared.origin);
+    rays.extend(as_shadow_rays(&rays));
+    assert_end_on_unit_cube(&kernel, &rays);
 }
 
 #[test]
@@ -121,8 +75,7 @@ fn invalid_rays_hit_nothing() {
     rays.extend(bad.iter().map(|&direction| Ray { direction, ..good }));
     rays.extend([DVec3::ZERO, DVec3::splat(-0.0)].map(|direction| Ray { direction, ..good }));
     rays.extend([0.0, -1.0].map(|t_max| Ray { t_max, ..good }));
-    let any: Vec<Ray> = rays.iter().map(|ray| Ray { any_hit: true, ..*ray }).collect();
-    rays.extend(any);
+    rays.extend(as_shadow_rays(&rays));
     for (ray, hit) in rays.iter().zip(trace(&kernel, &rays)) {
         assert_eq!(hit.triangle, NO_TRIANGLE, "{ray:?}");
     }

@@ -1,7 +1,8 @@
 //! No ray leaves a closed mesh, and a ray that is no ray hits nothing.
 
 use crate::common::trace::{
-    NO_TRIANGLE, Ray, cube, driver_leaks, icosphere, kernel, placements, rays_at_edges, scene_of, trace,
+    NO_TRIANGLE, Ray, as_shadow_rays, assert_end_on_unit_cube, assert_watertight, axis_parallel_rays, cube,
+    driver_leaks, icosphere, kernel, placements, scene_of, trace,
 };
 use glam::{DAffine3, DVec3};
 use sunfleck::scene::Primitive;
@@ -24,13 +25,7 @@ fn closed_meshes_are_watertight() {
     ];
     for (mesh, places) in cases {
         let kernel = kernel(&scene_of(vec![(mesh.clone(), places.clone())]));
-        let mut rays = rays_at_edges(&mesh, &places[0], kernel.prepared.origin, RAYS);
-        // Half of them as shadow rays.
-        rays.iter_mut().skip(RAYS / 2).for_each(|ray| ray.any_hit = true);
-        let hits = trace(&kernel, &rays);
-        let leaks: Vec<&Ray> =
-            rays.iter().zip(&hits).filter(|(_, hit)| hit.triangle == NO_TRIANGLE).map(|(ray, _)| ray).collect();
-        assert!(leaks.is_empty(), "{} of {RAYS} rays leave {places:?}: {:?}", leaks.len(), leaks[0]);
+        assert_watertight(&kernel, &mesh, &places[0], RAYS);
     }
 }
 
@@ -38,15 +33,7 @@ fn closed_meshes_are_watertight() {
 #[test]
 fn axis_parallel_rays_do_not_leak() {
     let kernel = kernel(&scene_of(vec![(cube(8), vec![DAffine3::IDENTITY])]));
-    let grid = |i: usize| [i % 15, i / 15 % 15, i / 225].map(|k| (k as f64 - 7.0) / 8.0);
-    let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
-    let from = |i| DVec3::from(grid(i)) - kernel.prepared.origin;
-    let rays: Vec<Ray> = (0..15 * 15 * 15).flat_map(|i| axes.map(|axis| Ray::new(from(i), axis))).collect();
-    for (ray, hit) in rays.iter().zip(trace(&kernel, &rays)) {
-        assert!(hit.triangle != NO_TRIANGLE, "{ray:?} leaks");
-        let end = (ray.origin + ray.direction * hit.t + kernel.prepared.origin).dot(ray.direction);
-        assert!((end - 1.0).abs() < 1e-6, "{ray:?} ends at {end}");
-    }
+    assert_end_on_unit_cube(&kernel, &axis_parallel_rays(15, kernel.prepared.origin));
 }
 
 /// A ray that is no ray hits nothing, whatever the back end would make of it.
@@ -67,8 +54,7 @@ fn invalid_rays_hit_nothing() {
     rays.push(Ray { direction: DVec3::splat(-0.0), ..good });
     rays.push(Ray { direction: DVec3::new(1e-40, -1e-42, 1e-45), ..good });
     rays.extend([0.0, -1.0].map(|t_max| Ray { t_max, ..good }));
-    let any: Vec<Ray> = rays.iter().map(|ray| Ray { any_hit: true, ..*ray }).collect();
-    rays.extend(any);
+    rays.extend(as_shadow_rays(&rays));
     for (ray, hit) in rays.iter().zip(trace(&kernel, &rays)) {
         assert_eq!(hit.triangle, NO_TRIANGLE, "{ray:?}");
     }
