@@ -1,4 +1,4 @@
-//! The `sunfleck` command: what drivers want to find, parse, run, print the error chain on one line, exit code; nothing
+//! The `sunfleck` command: parse, what drivers want to find, run, print the error chain on one line, exit code; nothing
 //! else.
 
 mod cli;
@@ -6,8 +6,9 @@ mod cli;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    sunfleck::gpu::prepare_driver_environment();
-    match cli::run(cli::parse()) {
+    let cli = cli::parse();
+    sunfleck::gpu::prepare_driver_environment(cli.paths());
+    match cli::run(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");

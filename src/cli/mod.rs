@@ -63,6 +63,16 @@ enum Command {
     WatchWorker(Box<watch::WorkerArgs>),
 }
 
+impl Cli {
+    /// How many paths the command will trace, where its flags say so.
+    pub(crate) fn paths(&self) -> Option<u64> {
+        match &self.command {
+            Command::Render(args) => args.paths(),
+            _ => None,
+        }
+    }
+}
+
 /// Parses the process's arguments; a usage error or `--help` ends the process.
 pub(crate) fn parse() -> Cli {
     let matches = not_built::mark_in_help(Cli::command()).get_matches();

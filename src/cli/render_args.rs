@@ -113,6 +113,17 @@ pub(crate) struct RenderJob {
 }
 
 impl RenderArgs {
+    /// How many paths the run will trace; `None` if a time or an error ends it.
+    pub(crate) fn paths(&self) -> Option<u64> {
+        let samples = match &self.samples {
+            Some(range) => range.end - range.start,
+            None if self.time.is_some() || self.target_error.is_some() => return None,
+            None => self.spp.unwrap_or(Settings::default().spp),
+        };
+        let (width, height) = self.resolution;
+        Some((u64::from(width) * u64::from(height)).saturating_mul(samples.into()))
+    }
+
     /// The job, after every check that needs neither the scene nor a device.
     pub(crate) fn resolve(self) -> Result<RenderJob> {
         let outputs = self.checked_outputs()?;
