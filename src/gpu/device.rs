@@ -8,6 +8,7 @@ use ash::{khr, vk};
 use gpu_allocator::AllocatorDebugSettings;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
+use super::pipeline_cache::PipelineCache;
 use super::{DeviceInfo, GpuError, GpuResult, Instance};
 
 /// Extensions that hardware ray queries need.
@@ -27,6 +28,7 @@ pub struct Gpu {
     pub(super) queue: Mutex<vk::Queue>,
     pub(super) queue_family: u32,
     pub(super) acceleration: Option<khr::acceleration_structure::Device>,
+    pub(super) pipeline_cache: PipelineCache,
     allocator: ManuallyDrop<Mutex<Allocator>>,
     /// What the device can do.
     pub info: DeviceInfo,
@@ -52,6 +54,9 @@ impl Gpu {
             .and_then(|i| u32::try_from(i).ok())
             .ok_or_else(|| lacks("has no compute queue"))?;
         let device = create_device(&instance, &info, requirements, queue_family)?;
+        // SAFETY: the physical device belongs to the instance.
+        let properties = unsafe { instance.raw.get_physical_device_properties(info.raw) };
+        let pipeline_cache = PipelineCache::new(&device, &properties)?;
         // SAFETY: queue 0 of this family was created with the device.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
         let allocator = Allocator::new(&AllocatorCreateDesc {
@@ -70,6 +75,7 @@ impl Gpu {
             queue: Mutex::new(queue),
             queue_family,
             acceleration,
+            pipeline_cache,
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             info,
             instance,
@@ -127,6 +133,7 @@ impl Drop for Gpu {
         unsafe {
             let _ = self.device.device_wait_idle();
             ManuallyDrop::drop(&mut self.allocator);
+            self.pipeline_cache.destroy(&self.device);
             self.device.destroy_device(None);
         }
     }

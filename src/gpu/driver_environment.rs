@@ -9,9 +9,10 @@
 
 use std::ffi::{OsStr, OsString};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
+use super::cache_folder::cache_folder;
 use super::lavapipe::{MesaVersion, lavapipe_versions};
 
 /// Mesa's variable for the width of lavapipe's vectors in bits.
@@ -97,19 +98,17 @@ struct Circumstances {
     has_avx512: bool,
     /// Those whose library the Vulkan loader would load; `None` for one that is not recognised.
     lavapipes: Vec<Option<MesaVersion>>,
-    cache_home: Option<PathBuf>,
+    cache_folder: Option<PathBuf>,
     paths: Option<u64>,
 }
 
 impl Circumstances {
     fn of_this_process(paths: Option<u64>) -> Self {
         let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
-        let home = || variable("HOME").map(|home| Path::new(&home).join(".cache"));
         let [width, cache, optimisation] = [WIDTH_VARIABLE, CACHE_VARIABLE, OPTIMISATION_VARIABLE].map(variable);
         // Reading the drivers takes milliseconds, which are spent only where the answer matters.
         let lavapipes = if cache.is_none() && width.is_none() { lavapipe_versions() } else { Vec::new() };
-        let cache_home = variable("XDG_CACHE_HOME").map(PathBuf::from).or_else(home);
-        Self { width, cache, optimisation, has_avx512: has_avx512(), lavapipes, cache_home, paths }
+        Self { width, cache, optimisation, has_avx512: has_avx512(), lavapipes, cache_folder: cache_folder(), paths }
     }
 }
 
@@ -129,13 +128,10 @@ fn choose(around: &Circumstances) -> DriverEnvironment {
     if around.cache.is_some() {
         return DriverEnvironment::nothing(format!("{CACHE_VARIABLE} is set"));
     }
-    let Some(home) = &around.cache_home else {
+    let Some(folder) = &around.cache_folder else {
         return DriverEnvironment::nothing("there is no folder for a shader cache");
     };
-    let cache = |width: &OsStr| {
-        let folder = home.join("sunfleck").join("mesa-shader-cache").join(width);
-        (CACHE_VARIABLE, folder.into_os_string())
-    };
+    let cache = |width: &OsStr| (CACHE_VARIABLE, folder.join("mesa-shader-cache").join(width).into_os_string());
     if let Some(width) = &around.width {
         let reason = format!("{WIDTH_VARIABLE} is set, and Mesa's shader cache does not know the width");
         return DriverEnvironment { set: vec![cache(width)], reason };
@@ -168,6 +164,8 @@ fn choose(around: &Circumstances) -> DriverEnvironment {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     fn around() -> Circumstances {
@@ -177,7 +175,7 @@ mod tests {
             optimisation: None,
             has_avx512: true,
             lavapipes: vec![Some(MesaVersion { major: 25, minor: 0 })],
-            cache_home: Some("/cache".into()),
+            cache_folder: Some("/cache/sunfleck".into()),
             paths: None,
         }
     }
@@ -198,7 +196,7 @@ mod tests {
             assert_eq!(choose(&Circumstances { lavapipes: lavapipes.clone(), ..around() }).set, [], "{lavapipes:?}");
         }
         assert_eq!(choose(&Circumstances { has_avx512: false, ..around() }).set, []);
-        assert_eq!(choose(&Circumstances { cache_home: None, ..around() }).set, []);
+        assert_eq!(choose(&Circumstances { cache_folder: None, ..around() }).set, []);
     }
 
     #[test]

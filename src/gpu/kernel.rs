@@ -197,11 +197,12 @@ impl Kernel {
                 .name(c"main")
                 .specialization_info(&specialization);
             let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
-            let pipelines = device.create_compute_pipelines(vk::PipelineCache::null(), &info, None);
+            let pipelines = device.create_compute_pipelines(self.gpu.pipeline_cache.raw(), &info, None);
             device.destroy_shader_module(module, None);
             self.pipeline =
                 pipelines.map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", &self.name)(result))?[0];
         }
+        self.gpu.pipeline_cache.store(device);
         Ok(())
     }
 

@@ -4,6 +4,7 @@
 
 mod acceleration_structure;
 mod buffer;
+mod cache_folder;
 mod device;
 mod driver_environment;
 mod enumerate;
@@ -11,6 +12,7 @@ mod error;
 mod instance;
 mod kernel;
 mod lavapipe;
+mod pipeline_cache;
 pub mod shader_compiler;
 pub mod specialize;
 mod submit;
