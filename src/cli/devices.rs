@@ -1,9 +1,12 @@
 //! `sunfleck devices`: every Vulkan device that could render.
 
+use std::sync::Arc;
+
+use anyhow::Context;
 use clap::Args;
 use serde_json::json;
-use sunfleck::gpu::{self, DeviceInfo, DeviceSelection, Instance, driver_environment};
-use sunfleck::render::{TraceChoice, choose_trace};
+use sunfleck::gpu::{self, DeviceInfo, DeviceSelection, Instance, driver_environment, forget_calibration};
+use sunfleck::render::{TraceChoice, calibrate, choose_trace};
 
 use super::print_json;
 
@@ -13,12 +16,28 @@ pub(crate) struct DevicesArgs {
     /// Print one JSON object on standard output.
     #[arg(long)]
     json: bool,
+    /// Measure on each device how fast it traces rays with every back end and every form of arrays, and take the fastest from
+    /// then on (half a minute a device). What was measured is kept in the cache folder, for this driver and this version.
+    #[arg(long, conflicts_with = "forget")]
+    calibrate: bool,
+    /// Forget what --calibrate measured.
+    #[arg(long)]
+    forget: bool,
 }
 
 /// Lists the devices.
 pub(crate) fn run(args: &DevicesArgs) -> anyhow::Result<()> {
     let instance = Instance::new().map_err(sunfleck::Error::from)?;
-    let devices = gpu::devices(&instance).map_err(sunfleck::Error::from)?;
+    let mut devices = gpu::devices(&instance).map_err(sunfleck::Error::from)?;
+    for device in devices.iter_mut().filter(|device| device.unusable.is_none()) {
+        if args.calibrate {
+            measure(&instance, device)?;
+        }
+        if args.forget && forget_calibration(device).context("cannot forget the calibration")? {
+            device.calibration = None;
+            eprintln!("{}: forgotten", device.name);
+        }
+    }
     let default = gpu::select(&devices, &DeviceSelection::Auto).ok().map(|(device, _)| device.index);
     if args.json {
         let list: Vec<_> = devices.iter().map(|d| describe_json(d, default)).collect();
@@ -30,6 +49,18 @@ pub(crate) fn run(args: &DevicesArgs) -> anyhow::Result<()> {
     if let Some(environment) = driver_environment() {
         println!("environment for lavapipe: {environment}");
     }
+    Ok(())
+}
+
+/// Measures the device and keeps what was measured.
+fn measure(instance: &Arc<Instance>, device: &mut DeviceInfo) -> anyhow::Result<()> {
+    eprintln!("{}: {}", device.index, device.name);
+    let calibration = calibrate(instance, device, &mut |trace, form, scene| {
+        eprintln!("   measuring {trace}, {form}, on {scene}");
+    })?;
+    let path = calibration.store(device).context("cannot keep the calibration")?;
+    eprintln!("   kept in {}", path.display());
+    device.calibration = Some(calibration);
     Ok(())
 }
 
@@ -58,6 +89,14 @@ fn describe(d: &DeviceInfo, default: Option<usize>) {
     println!("   texel buffer    {} texels", l.texel_buffer_elements);
     println!("   allocation      {} MiB", l.allocation_size >> 20);
     println!("   workgroup       {} lanes, subgroups of {}", l.workgroup_invocations, l.subgroup_size);
+    if let Some(calibration) = &d.calibration {
+        println!("   calibrated      million paths/s on {}", calibration.scenes.join(", "));
+        for v in &calibration.variants {
+            let rates: Vec<_> = v.paths_per_second.iter().map(|rate| format!("{:8.3}", rate / 1e6)).collect();
+            let best = if Some(v) == calibration.best() { " (taken)" } else { "" };
+            println!("      {:9} {:14} {}{best}", v.trace.to_string(), v.array_form.to_string(), rates.join(" "));
+        }
+    }
     if let Some(why) = &d.unusable {
         println!("   unusable        {why}");
     }
@@ -77,6 +116,7 @@ fn describe_json(d: &DeviceInfo, default: Option<usize>) -> serde_json::Value {
         "buffer_device_address": d.buffer_device_address,
         "trace_auto": trace.to_string(),
         "trace_auto_reason": why,
+        "calibration": d.calibration,
         "default": default == Some(d.index),
         "unusable": d.unusable,
         "limits": {

@@ -54,9 +54,7 @@ impl Gpu {
             .and_then(|i| u32::try_from(i).ok())
             .ok_or_else(|| lacks("has no compute queue"))?;
         let device = create_device(&instance, &info, requirements, queue_family)?;
-        // SAFETY: the physical device belongs to the instance.
-        let properties = unsafe { instance.raw.get_physical_device_properties(info.raw) };
-        let pipeline_cache = PipelineCache::new(&device, &properties)?;
+        let pipeline_cache = PipelineCache::new(&device, &info.identity)?;
         // SAFETY: queue 0 of this family was created with the device.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
         let allocator = Allocator::new(&AllocatorCreateDesc {

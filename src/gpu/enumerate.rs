@@ -1,10 +1,11 @@
 //! Which devices there are, what they can do, and which one to take.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use ash::vk;
 
-use super::{GpuError, GpuResult, Instance};
+use super::{Calibration, GpuError, GpuResult, Instance};
 
 /// The class of a device, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,6 +72,10 @@ pub struct DeviceInfo {
     pub buffer_device_address: bool,
     /// Limits.
     pub limits: DeviceLimits,
+    /// Tells this device and this build of its driver from all others, as the driver does; fit for a file name.
+    pub identity: String,
+    /// What `sunfleck devices --calibrate` measured on it.
+    pub calibration: Option<Calibration>,
     /// Why it cannot be used at all, if so.
     pub unusable: Option<String>,
     pub(super) raw: vk::PhysicalDevice,
@@ -124,6 +129,7 @@ fn describe(instance: &Instance, index: usize, raw: vk::PhysicalDevice) -> Devic
         .join(" ");
     let v = base.api_version;
     let features = Features::of(instance, raw, has_1_2);
+    let identity = identity(&base, &driver_text);
     let unusable = (!has_1_2).then(|| "offers Vulkan below 1.2".to_owned());
     DeviceInfo {
         index,
@@ -145,9 +151,25 @@ fn describe(instance: &Instance, index: usize, raw: vk::PhysicalDevice) -> Devic
             subgroup_size: subgroup.subgroup_size,
             stage_storage_buffers: base.limits.max_per_stage_descriptor_storage_buffers,
         },
+        calibration: Calibration::load(&identity),
+        identity,
         unusable,
         raw,
     }
+}
+
+fn identity(properties: &vk::PhysicalDeviceProperties, driver: &str) -> String {
+    let uuid: String = properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
+    // Mesa 22's lavapipe has one UUID and one version number for all of its builds.
+    let mut text = DefaultHasher::new();
+    driver.hash(&mut text);
+    format!(
+        "{:04x}-{:04x}-{:08x}-{uuid}-{:08x}",
+        properties.vendor_id,
+        properties.device_id,
+        properties.driver_version,
+        text.finish() as u32
+    )
 }
 
 fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {

@@ -8,7 +8,8 @@ use super::specialize::specialize;
 use super::{AccelerationStructures, Buffer, Gpu, GpuError, GpuResult};
 
 /// How the shader traces rays (macro TRACE_BACKEND).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[repr(u32)]
 pub enum TraceBackend {
     /// Our own BVH.
@@ -27,7 +28,8 @@ impl std::fmt::Display for TraceBackend {
 }
 
 /// How the shader reads the scene arrays (macro ARRAY_FORM).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[repr(u32)]
 pub enum ArrayForm {
     /// rgba32ui texel buffers: the cheapest divergent load on software devices.

@@ -5,6 +5,7 @@
 mod acceleration_structure;
 mod buffer;
 mod cache_folder;
+mod calibration;
 mod device;
 mod driver_environment;
 mod enumerate;
@@ -19,6 +20,7 @@ mod submit;
 
 pub use acceleration_structure::{AccelerationStructures, InstanceGeometry, MeshGeometry, MeshPart};
 pub use buffer::{Buffer, MemoryUse};
+pub use calibration::{CalibratedVariant, Calibration, forget_calibration};
 pub use device::{DeviceRequirements, Gpu};
 pub use driver_environment::{DriverEnvironment, driver_environment, prepare_driver_environment};
 pub use enumerate::{DeviceInfo, DeviceKind, DeviceLimits, DeviceSelection, devices, select};

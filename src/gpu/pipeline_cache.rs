@@ -6,13 +6,13 @@
 
 use std::fs;
 use std::hash::{DefaultHasher, Hasher};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use ash::vk;
 
-use super::cache_folder::cache_folder;
+use super::cache_folder::{cache_folder, replace_file};
 use super::{GpuError, GpuResult};
 
 /// What a file begins with: the format and its version, then the length and the hash of the data, 8 bytes each.
@@ -32,12 +32,12 @@ pub(super) struct PipelineCache {
 }
 
 impl PipelineCache {
-    /// The device's cache, with what the file holds.
+    /// The cache of the device with this [`super::DeviceInfo::identity`], with what the file holds.
     ///
     /// # Errors
     /// When the driver cannot make a cache.
-    pub(super) fn new(device: &ash::Device, properties: &vk::PhysicalDeviceProperties) -> GpuResult<Self> {
-        let path = cache_folder().map(|folder| folder.join("pipelines").join(file_name(properties)));
+    pub(super) fn new(device: &ash::Device, identity: &str) -> GpuResult<Self> {
+        let path = cache_folder().map(|folder| folder.join("pipelines").join(format!("{identity}.bin")));
         let data = path.as_deref().map_or_else(Vec::new, |path| {
             read(path).unwrap_or_else(|error| {
                 tracing::debug!("{}: {error}; the pipeline cache is begun anew", path.display());
@@ -76,12 +76,6 @@ impl PipelineCache {
     }
 }
 
-/// A name for this device and this build of its driver, as the driver tells them apart.
-fn file_name(properties: &vk::PhysicalDeviceProperties) -> String {
-    let uuid: String = properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
-    format!("{:04x}-{:04x}-{:08x}-{uuid}.bin", properties.vendor_id, properties.device_id, properties.driver_version)
-}
-
 fn hash(data: &[u8]) -> u64 {
     let mut hasher = DefaultHasher::new();
     hasher.write(data);
@@ -100,17 +94,8 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
     if header == expected && data.len() <= MOST_BYTES { Ok(data.to_vec()) } else { Err(damaged()) }
 }
 
-/// Writes a file beside the old one and renames it, so that another process reads the old or the new one.
 fn write(path: &Path, data: &[u8]) -> io::Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    file.write_all(MAGIC)?;
-    file.write_all(&(data.len() as u64).to_le_bytes())?;
-    file.write_all(&hash(data).to_le_bytes())?;
-    file.write_all(data)?;
-    file.persist(path)?;
-    Ok(())
+    replace_file(path, &[MAGIC, &(data.len() as u64).to_le_bytes(), &hash(data).to_le_bytes(), data])
 }
 
 #[cfg(test)]
@@ -147,14 +132,5 @@ mod tests {
         }
         fs::write(&path, [&whole[..], b"more"].concat()).unwrap();
         assert!(read(&path).is_err(), "with more at its end");
-    }
-
-    #[test]
-    fn each_driver_build_has_its_file() {
-        let mut properties = vk::PhysicalDeviceProperties { vendor_id: 0x10005, ..Default::default() };
-        let one = file_name(&properties);
-        properties.pipeline_cache_uuid[15] = 1;
-        let other = file_name(&properties);
-        assert!(one != other && one.starts_with("10005-"), "{one} {other}");
     }
 }

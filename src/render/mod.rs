@@ -1,6 +1,7 @@
 //! Rendering: what is asked for ([`Settings`]), how it goes on ([`ProgressUpdate`]) and what comes out ([`RenderResult`]).
 
 mod bake;
+mod calibrate;
 mod function_kernel;
 mod kernel_key;
 mod looks;
@@ -18,6 +19,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 pub use bake::{Bake, BakeReport, Baked, MOST_BAKED_RECORDS, MOST_BAKED_TRIANGLES};
+pub use calibrate::calibrate;
 pub use function_kernel::FunctionCall;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};

@@ -35,16 +35,26 @@ pub fn open_device(settings: &Settings) -> Result<OpenDevice> {
     Ok(OpenDevice { gpu: Gpu::new(instance, info, requirements)?, trace, reason })
 }
 
-/// `auto` takes what is faster, not what exists: a CPU driver's ray query is slower than our BVH by 4 to 26 times (see
-/// docs/benchmarks).
-pub fn choose_trace(info: &DeviceInfo, choice: TraceChoice) -> (TraceBackend, &'static str) {
-    match choice {
+/// How rays are traced on the device, and why. `auto` takes what is faster, not what exists: what was measured on the device
+/// ([`crate::gpu::Calibration`]), else by the rule that a CPU driver's ray query is slower than our BVH by 4 to 26 times
+/// (docs/benchmarks).
+pub fn choose_trace(info: &DeviceInfo, choice: TraceChoice) -> (TraceBackend, String) {
+    let measured = info.calibration.as_ref().and_then(|calibration| calibration.best());
+    let (trace, why) = match choice {
         TraceChoice::Bvh => (TraceBackend::Bvh, "asked for"),
         TraceChoice::RayQuery => (TraceBackend::RayQuery, "asked for"),
         TraceChoice::Auto if !info.ray_query => (TraceBackend::Bvh, "the device has no ray queries"),
-        TraceChoice::Auto if info.kind == DeviceKind::Cpu => {
-            (TraceBackend::Bvh, "faster than a software driver's ray queries")
+        TraceChoice::Auto => {
+            if let Some(best) = measured {
+                let rate = best.mean_paths_per_second() / 1e6;
+                return (best.trace, format!("calibrated: {rate:.2} million paths/s, the fastest"));
+            }
+            if info.kind == DeviceKind::Cpu {
+                (TraceBackend::Bvh, "faster than a software driver's ray queries")
+            } else {
+                (TraceBackend::RayQuery, "hardware ray queries")
+            }
         }
-        TraceChoice::Auto => (TraceBackend::RayQuery, "hardware ray queries"),
-    }
+    };
+    (trace, why.to_owned())
 }

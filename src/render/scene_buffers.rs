@@ -6,8 +6,8 @@ use std::sync::Arc;
 use ash::vk::BufferUsageFlags as Usage;
 
 use crate::gpu::{
-    AccelerationStructures, ArrayForm, BindingResource, Buffer, DeviceInfo, DeviceKind, Gpu, GpuError, GpuResult,
-    InstanceGeometry, MeshGeometry, MeshPart, TraceBackend,
+    AccelerationStructures, ArrayForm, BindingResource, Buffer, Calibration, DeviceInfo, DeviceKind, Gpu, GpuError,
+    GpuResult, InstanceGeometry, MeshGeometry, MeshPart, TraceBackend,
 };
 use crate::layout::{MAX_CHUNKS, SCENE_ARRAYS, SceneArray, TRIANGLE_ALPHA, Texel};
 use crate::prepare::Prepared;
@@ -15,12 +15,13 @@ use crate::prepare::Prepared;
 /// Custom index of the baked mesh, as in shaders/include/trace_ray_query.glsl.
 const BAKED_INSTANCE: u32 = 0xff_ffff;
 /// An array that is not split.
-const WHOLE: u32 = 31;
+pub(super) const WHOLE: u32 = 31;
 
 /// How arrays of the given sizes (in texels) are bound on a device: the form, and log2 of a chunk's texels.
 ///
-/// Software drivers load from texel buffers cheapest; a GPU reads storage buffers. Device addresses have no limit and
-/// serve where the others cannot hold the arrays.
+/// What was measured to be fastest on the device ([`crate::gpu::Calibration`]) if it holds them whole. Else software drivers
+/// load from texel buffers cheapest; a GPU reads storage buffers. Device addresses have no limit and serve where the
+/// others cannot hold the arrays.
 ///
 /// # Errors
 /// [`GpuError::Lacks`] if no form can hold them.
@@ -36,8 +37,7 @@ pub fn choose_array_form(info: &DeviceInfo, lengths: &[usize]) -> GpuResult<(Arr
     let allocation_texels = info.limits.allocation_size / 16;
     let texel = shift(info.limits.texel_buffer_elements.min(allocation_texels));
     let storage = shift((info.limits.storage_buffer_range / 16).min(allocation_texels));
-    let has_bindings = info.limits.stage_storage_buffers as usize >= SCENE_ARRAYS * MAX_CHUNKS + 2;
-    let storage = storage.filter(|_| has_bindings).map(|s| (ArrayForm::StorageBuffer, s));
+    let storage = storage.filter(|_| binds_storage(info)).map(|s| (ArrayForm::StorageBuffer, s));
     let texel = texel.map(|s| (ArrayForm::TexelBuffer, s));
     let address = info.buffer_device_address.then_some((ArrayForm::DeviceAddress, WHOLE));
     let whole = |choice: Option<(ArrayForm, u32)>| choice.filter(|&(_, s)| s == WHOLE);
@@ -47,10 +47,18 @@ pub fn choose_array_form(info: &DeviceInfo, lengths: &[usize]) -> GpuResult<(Arr
     } else {
         [whole(storage), address, storage, whole(texel), texel]
     };
-    order.into_iter().flatten().next().ok_or_else(|| GpuError::Lacks {
+    let measured = info.calibration.as_ref().and_then(Calibration::best).map(|best| best.array_form);
+    let preferred = [texel, storage, address].into_iter().map(whole).find(|choice| choice.map(|c| c.0) == measured);
+    let preferred = preferred.flatten();
+    preferred.into_iter().chain(order.into_iter().flatten()).next().ok_or_else(|| GpuError::Lacks {
         device: info.name.clone(),
         lacks: format!("cannot bind an array of {} MiB in {MAX_CHUNKS} parts", longest / 65_536),
     })
+}
+
+/// Whether the device binds as many storage buffers as the arrays have chunks, beside results and lane states.
+pub(super) fn binds_storage(info: &DeviceInfo) -> bool {
+    info.limits.stage_storage_buffers as usize >= SCENE_ARRAYS * MAX_CHUNKS + 2
 }
 
 /// The scene's buffers.

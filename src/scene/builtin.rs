@@ -1,17 +1,23 @@
 //! Scenes that are part of the binary.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DAffine3, DMat4, DVec3};
 
 use super::{Camera, Instance, Material, Mesh, Primitive, Projection, Scene};
 
 /// The names [`builtin`] knows.
 pub fn names() -> &'static [&'static str] {
-    &["cornell"]
+    &["cornell", "bumpy"]
 }
 
 /// The built-in scene of that name.
 pub fn builtin(name: &str) -> Option<Scene> {
-    (name == "cornell").then(cornell)
+    match name {
+        "cornell" => Some(cornell()),
+        "bumpy" => Some(bumpy()),
+        _ => None,
+    }
 }
 
 /// The Cornell box of Mitsuba 3's `cornell_box()`: its geometry, numbers and camera (`mitsuba/python/util.py`, 3.9.1).
@@ -59,6 +65,16 @@ fn cornell() -> Scene {
     }
 }
 
+/// The walls and the lamp of [`cornell`] around a sphere with bumps: 9,800 triangles, flat-shaded.
+fn bumpy() -> Scene {
+    let mut scene = cornell();
+    scene.name = String::from("bumpy");
+    let primitives = &mut scene.meshes[0].primitives;
+    primitives.truncate(6);
+    primitives.push(bumpy_sphere(DVec3::new(0.0, -0.3, 0.0), 0.6, 50));
+    scene
+}
+
 const WHITE: [f32; 3] = [0.885809, 0.698859, 0.666422];
 
 /// Mitsuba's `rectangle`: [−1, 1]² in the plane z = 0, its front towards +Z.
@@ -86,6 +102,34 @@ fn cube(to_world: DMat4, material: usize) -> Primitive {
     }
 }
 
+/// A sphere of `n` latitudes and 2n longitudes, 4n(n − 1) triangles, their fronts outwards, with two waves on its radius.
+fn bumpy_sphere(centre: DVec3, radius: f64, n: u32) -> Primitive {
+    let longitudes = 2 * n;
+    let point = |theta: f64, phi: f64| {
+        let waves = 0.12 * (13.0 * phi).sin() * (11.0 * theta).sin() + 0.03 * (57.0 * phi).sin() * (61.0 * theta).sin();
+        let direction = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+        (centre + radius * (1.0 + waves) * direction).to_array().map(|x| x as f32)
+    };
+    let angle = |i: u32, count: u32, turn: f64| f64::from(i) / f64::from(count) * turn;
+    let mut positions: Vec<_> = (1..n)
+        .flat_map(|i| (0..longitudes).map(move |j| (i, j)))
+        .map(|(i, j)| point(angle(i, n, PI), angle(j, longitudes, TAU)))
+        .collect();
+    let north = (n - 1) * longitudes;
+    positions.extend([point(0.0, 0.0), point(PI, 0.0)]);
+    let mut triangles = Vec::new();
+    for j in 0..longitudes {
+        let next = (j + 1) % longitudes;
+        for ring in 0..n - 2 {
+            let (upper, lower) = (ring * longitudes, (ring + 1) * longitudes);
+            triangles.extend([[upper + j, upper + next, lower + j], [upper + next, lower + next, lower + j]]);
+        }
+        let last = (n - 2) * longitudes;
+        triangles.extend([[north, next, j], [north + 1, last + j, last + next]]);
+    }
+    Primitive { positions, triangles, material: 0, ..Primitive::default() }
+}
+
 fn bake(to_world: DMat4, corner: [f64; 3]) -> [f32; 3] {
     to_world.transform_point3(DVec3::from(corner)).to_array().map(|x| x as f32)
 }
@@ -100,6 +144,23 @@ mod tests {
             builtin(name).expect("a listed name exists").validate().expect("a built-in scene is valid");
         }
         assert!(builtin("no such scene").is_none());
+    }
+
+    #[test]
+    fn the_bumpy_sphere_is_closed_and_faces_outwards() {
+        let scene = bumpy();
+        let sphere = &scene.meshes[0].primitives[6];
+        assert_eq!(sphere.triangles.len(), 9800);
+        let centre = DVec3::new(0.0, -0.3, 0.0);
+        let mut edges = std::collections::HashMap::new();
+        for triangle in &sphere.triangles {
+            let [a, b, c] = triangle.map(|i| DVec3::from(sphere.positions[i as usize].map(f64::from)));
+            assert!((b - a).cross(c - a).dot(a - centre) > 0.0, "{triangle:?}");
+            for k in 0..3 {
+                *edges.entry((triangle[k], triangle[(k + 1) % 3])).or_insert(0) += 1;
+            }
+        }
+        assert!(edges.iter().all(|(&(a, b), &count)| count == 1 && edges.get(&(b, a)) == Some(&1)));
     }
 
     /// Seen from inside, every wall faces the camera's side; the boxes face outwards; the lamp faces down.

@@ -1,6 +1,7 @@
 //! Tests of the program as people call it.
 
 mod bench;
+mod devices;
 mod driver_environment;
 mod images;
 mod usage;
