@@ -11,10 +11,12 @@ use glam::DVec3;
 use super::bake::{Bake, BakeReport};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
+use super::run::SliceResults;
 use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
 use super::{Integrator, ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
+use crate::film::aov::Aov;
 use crate::film::replicates::ReplicateSums;
 use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
@@ -45,6 +47,8 @@ pub struct PathTracer {
     key: KernelKey,
     kernel: Kernel,
     constants: RenderConstants,
+    /// Where rebased space has its zero.
+    origin: DVec3,
     constants_buffer: Buffer,
     slices: Vec<Slice>,
     buffers: SceneBuffers,
@@ -60,7 +64,8 @@ impl PathTracer {
     /// Uploads the scene and compiles its kernel.
     ///
     /// # Errors
-    /// Out of memory, a shader that does not compile, a limit of the device that the scene does not fit.
+    /// Out of memory, a shader that does not compile, a limit of the device that the scene does not fit; an AOV that the
+    /// back end cannot give.
     pub fn new(
         gpu: &Arc<Gpu>,
         trace: TraceBackend,
@@ -69,6 +74,7 @@ impl PathTracer {
         settings: &Settings,
         overrides: BindingOverride,
     ) -> Result<Self> {
+        check_aovs(&settings.aovs, trace)?;
         let start = Instant::now();
         let lengths: Vec<usize> = prepared.arrays.iter().map(Vec::len).collect();
         let form = match overrides.array_form {
@@ -88,11 +94,11 @@ impl PathTracer {
             MemoryUse::Upload,
         )?;
         let slice_lanes = overrides.slice_lanes.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
-        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes)).collect();
+        let mut key = KernelKey::new(prepared, camera, settings, trace, form);
+        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes, &key)).collect();
         let mut slices = slices?;
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let mut key = KernelKey::new(prepared, camera, settings, trace, form);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
@@ -101,6 +107,7 @@ impl PathTracer {
             key,
             kernel,
             constants,
+            origin: prepared.origin,
             constants_buffer,
             slices,
             buffers,
@@ -122,7 +129,7 @@ impl PathTracer {
     }
 
     /// Builds the kernel anew, for other settings or shaders, and keeps the scene on the device. `prepared` is the scene
-    /// that was uploaded. On an error the tracer is as it was.
+    /// that was uploaded; AOVs and statistics stay those that it was made for. On an error the tracer is as it was.
     ///
     /// # Errors
     /// A shader that does not compile, a lost device.
@@ -130,6 +137,7 @@ impl PathTracer {
         let start = Instant::now();
         let form = (self.key.array_form, self.key.chunk_shift);
         let mut key = KernelKey::new(prepared, camera, settings, self.key.trace, form);
+        (key.aovs, key.statistics) = (self.key.aovs, self.key.statistics);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
         let kernel =
             build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &self.constants_buffer, &self.slices)?;
@@ -182,7 +190,7 @@ impl PathTracer {
         self.constants.seed = seed;
         let looks = Looks::new(plan.samples.clone(), plan.target_error);
         let mut sizes = SliceSizes::new(self.overrides, self.slices[0].lanes());
-        let mut run = Run::new(&self.constants, plan);
+        let mut run = Run::new(&self.constants, plan, &self.key);
         // An open end is no total.
         let mut expected = (plan.samples.end < u32::MAX).then(|| plan.samples.end - plan.samples.start);
         let (start, mut done, mut end) = (Instant::now(), plan.samples.start, looks.first_end());
@@ -220,6 +228,7 @@ impl PathTracer {
         let mut schedule = Schedule::new(&self.constants);
         let mut in_flight = VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
+        let mut last_end = Instant::now();
         loop {
             if limits.time.is_some_and(|limit| limits.start.elapsed() >= limit) && !schedule.is_done() {
                 run.stop(StopReason::Time);
@@ -232,9 +241,16 @@ impl PathTracer {
             }
             // In the order of submission, so that a pixel's blocks are joined by their index.
             let Some(slot) = in_flight.pop_front() else { return Ok(()) };
-            let outcome = self.slices[slot].finish(&self.kernel, slot)?;
+            let outcome = self.slices[slot].finish(&self.kernel, slot, last_end)?;
+            last_end = Instant::now();
             sizes.observe(&outcome);
-            run.add(&self.constants, &outcome, self.slices[slot].results(outcome.constants.lanes)?);
+            let (slice, lanes) = (&self.slices[slot], outcome.constants.lanes);
+            let brought = SliceResults {
+                results: slice.results(lanes)?,
+                aovs: slice.aovs(lanes)?,
+                counters: slice.counters(lanes)?,
+            };
+            run.add(&self.constants, &outcome, &brought, self.origin);
             free.push(slot);
             let update = ProgressUpdate {
                 samples_done: run.paths,
@@ -258,6 +274,16 @@ struct Limits {
     start: Instant,
     time: Option<Duration>,
     samples_total: Option<u64>,
+}
+
+/// A driver does not say what its ray queries visit.
+fn check_aovs(aovs: &[Aov], trace: TraceBackend) -> Result<()> {
+    if aovs.contains(&Aov::Cost) && trace == TraceBackend::RayQuery {
+        return Err(Error::Usage(String::from(
+            "--aov cost: nobody can tell what ray queries visit; add --trace bvh, or leave cost out",
+        )));
+    }
+    Ok(())
 }
 
 /// An integrator that adds nothing behind the first scattering events need not look there.
@@ -295,20 +321,23 @@ fn build_kernel(
 ) -> Result<Kernel> {
     let arrays = buffers.bindings();
     let array_binding = array_binding(buffers, key.array_form, &arrays);
-    let sets: Vec<Vec<BindingResource<'_>>> = slices
+    let sets: Vec<Vec<(u32, BindingResource<'_>)>> = slices
         .iter()
         .map(|slice| {
+            // What the kernel does not keep it does not declare, unless the driver specialises it: then it does not use it.
             let mut set = vec![
-                BindingResource::Uniform(constants),
-                BindingResource::Storage(&slice.results),
-                BindingResource::Storage(&slice.lane_states),
-                array_binding,
+                (0, BindingResource::Uniform(constants)),
+                (1, BindingResource::Storage(&slice.results)),
+                (2, BindingResource::Storage(&slice.lane_states)),
+                (3, array_binding),
             ];
-            set.extend(buffers.acceleration.as_ref().map(BindingResource::AccelerationStructure));
+            set.extend(buffers.acceleration.as_ref().map(|a| (4, BindingResource::AccelerationStructure(a))));
+            set.push((5, BindingResource::Storage(slice.aovs.as_ref().unwrap_or(&slice.results))));
+            set.push((6, BindingResource::Storage(slice.counters.as_ref().unwrap_or(&slice.results))));
             set
         })
         .collect();
-    let sets: Vec<&[BindingResource<'_>]> = sets.iter().map(Vec::as_slice).collect();
+    let sets: Vec<&[(u32, BindingResource<'_>)]> = sets.iter().map(Vec::as_slice).collect();
     let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
     Ok(Kernel::new(
         gpu,
