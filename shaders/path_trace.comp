@@ -1,8 +1,8 @@
 #version 460
-// The path tracer: a lane renders one atom, that is one pixel and one aligned block of at most 16 sample indices, in
-// order. A lane traces one ray at a time, whatever it is for, in one loop, and takes its next sample as soon as a path
-// ends, so that neighbouring lanes stay busy. A lane that has used up its budget of rays saves its state for the next
-// dispatch: the image does not depend on where it was cut.
+// The path tracer: a lane renders atoms, each of one pixel and one aligned block of at most 16 sample indices, in order. A
+// lane traces one ray at a time, whatever it is for, in one loop, takes its next sample as soon as a path ends, and the
+// slice's next atom as soon as one is finished, so that neighbouring lanes stay busy. A lane that has used up an atom's
+// budget of rays saves its state for the next dispatch: the image depends neither on where it was cut nor on the lane.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
 #if TRACE_BACKEND == 1
@@ -28,6 +28,7 @@ layout(set = 0, binding = 1, std430) writeonly buffer ResultBlock { BlockResult 
 layout(set = 0, binding = 2, std430) buffer LaneBlock { LaneState lanes[]; };
 layout(set = 0, binding = 5, std430) buffer AovBlock { AovSums block_aovs[]; };
 layout(set = 0, binding = 6, std430) buffer CounterBlock { RayCounters block_counters[]; };
+layout(set = 0, binding = 7, std430) buffer QueueBlock { SliceQueue queue; };
 layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 
 // Longest path; reported when it is met. Roulette ends paths long before.
@@ -307,18 +308,68 @@ bool advance_path(inout LaneState lane, Hit hit) {
     return finish_shadow(lane, free);
 }
 
-void next_sample(inout LaneState lane) {
-    finish_sample(lane);
-    if (lane.sample_index < lane.end_sample) start_sample(lane);
+void begin_extras() {
+    if (HAS_AOVS) begin_aovs();
+    if (HAS_STATISTICS) begin_counters();
+    if (COUNTS_VISITS) begin_visits();
 }
 
-void render(inout LaneState lane, uint ray_limit) {
+void store_extras(uint atom) {
+    if (HAS_AOVS) block_aovs[atom] = aovs;
+    if (HAS_STATISTICS) block_counters[atom] = counters;
+}
+
+// What the block has so far, if the lane goes on with it.
+void load_extras(uint atom) {
+    begin_extras();
+    if (HAS_AOVS) aovs = block_aovs[atom];
+    if (HAS_STATISTICS) counters = block_counters[atom];
+}
+
+void finish_atom(LaneState lane) {
+    results[lane.atom] = block_result(lane);
+    if (HAS_EXTRAS) store_extras(lane.atom);
+    atomicAdd(queue.done, 1u);
+}
+
+// Takes the slice's next atom that has samples; false if none is left.
+bool take_atom(inout LaneState lane) {
+    while (true) {
+        uint atom = atomicAdd(queue.taken, 1u);
+        if (atom >= slice.atoms) break;
+        begin_atom(lane, constants, slice, atom);
+        if (HAS_EXTRAS) begin_extras();
+        if (lane.sample_index < lane.end_sample) return true;
+        finish_atom(lane);
+    }
+    lane.atom = NONE;
+    return false;
+}
+
+// Starts the lane's next sample, of the next atom if its own is finished; false if the slice has no more.
+bool start_next(inout LaneState lane) {
+    if (lane.sample_index >= lane.end_sample) {
+        if (lane.atom != NONE) finish_atom(lane);
+        if (!take_atom(lane)) return false;
+    }
+    start_sample(lane);
+    return true;
+}
+
+void render(inout LaneState lane) {
     Trace trace;
-    trace_begin(trace, constants, lane.ray, alpha_key(lane));
-    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
-        trace_advance(trace, constants);
-        if (!trace_done(trace)) continue;
-        if (!advance_path(lane, trace_hit(trace))) next_sample(lane);
+    bool has_path = lane.atom != NONE;
+    if (has_path) trace_begin(trace, constants, lane.ray, alpha_key(lane));
+    while (true) {
+        if (has_path) {
+            trace_advance(trace, constants);
+            if (!trace_done(trace)) continue;
+            has_path = advance_path(lane, trace_hit(trace));
+            if (!has_path) finish_sample(lane);
+        }
+        if (!has_path && !start_next(lane)) break;
+        if (lane.rays >= lane.ray_limit) break;
+        has_path = true;
         trace_begin(trace, constants, lane.ray, alpha_key(lane));
     }
 }
@@ -326,63 +377,48 @@ void render(inout LaneState lane, uint ray_limit) {
 #if TRACE_BACKEND == TRACE_BVH
 // A search ends at once, so that all lanes shade together; the shadow ray is traced by a search of its own, which only asks
 // whether there is anything.
-void render_baked(inout LaneState lane, uint ray_limit) {
-    while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
+void render_baked(inout LaneState lane) {
+    bool has_path = lane.atom != NONE;
+    while (true) {
+        if (!has_path && !start_next(lane)) break;
+        if (lane.rays >= lane.ray_limit) break;
         lane.rays += 1u;
         Found found = find_nearest(constants, lane.ray);
         if (HAS_STATISTICS) count_shading_vector();
         if (COUNTS_VISITS) count_traced(path_ray_kind(lane));
-        bool goes_on = false;
+        has_path = false;
         // Behind the one test, the triangle is loaded once for the hit and for shading.
-        if (found.slot != NONE) goes_on = shade_surface(lane, found_hit(lane.ray, found));
+        if (found.slot != NONE) has_path = shade_surface(lane, found_hit(lane.ray, found));
         else leave_scene(lane);
-        if (goes_on && lane.ray.any_hit) {
+        if (has_path && lane.ray.any_hit) {
             lane.rays += 1u;
             bool free = !trace_occluded(constants, lane.ray);
             if (HAS_STATISTICS) count_shading_vector();
             if (COUNTS_VISITS) count_traced(RAY_SHADOW);
-            goes_on = finish_shadow(lane, free);
+            has_path = finish_shadow(lane, free);
         }
-        if (!goes_on) next_sample(lane);
+        if (!has_path) finish_sample(lane);
     }
 }
 #endif
-
-// What the block has so far, if the lane goes on with it.
-void load_extras(uint index) {
-    bool resumes = slice.resume != 0u;
-    if (HAS_AOVS) begin_aovs();
-    if (HAS_AOVS && resumes) aovs = block_aovs[index];
-    if (HAS_STATISTICS) begin_counters();
-    if (HAS_STATISTICS && resumes) counters = block_counters[index];
-    if (COUNTS_VISITS) begin_visits();
-}
-
-void store_extras(uint index) {
-    if (HAS_AOVS) block_aovs[index] = aovs;
-    if (HAS_STATISTICS) block_counters[index] = counters;
-}
 
 void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= slice.lanes) return;
-    LaneState lane;
+    LaneState lane = idle_lane();
     if (slice.resume != 0u) {
         lane = lanes[index];
-        if (lane.sample_index >= lane.end_sample) return;
-    } else {
-        lane = new_lane(constants, slice, index);
-        if (lane.sample_index < lane.end_sample) start_sample(lane);
+        if (lane.atom == NONE) return;
+        lane.ray_limit = lane.rays + slice.ray_budget;
+        if (HAS_EXTRAS) load_extras(lane.atom);
     }
-    uint ray_limit = lane.rays + slice.ray_budget;
-    if (HAS_EXTRAS) load_extras(index);
 #if TRACE_BACKEND == TRACE_BVH
-    if (BAKES_GEOMETRY) render_baked(lane, ray_limit);
+    if (BAKES_GEOMETRY) render_baked(lane);
     else
 #endif
-    render(lane, ray_limit);
-    bool complete = lane.sample_index >= lane.end_sample;
-    results[index] = block_result(lane, complete);
-    lanes[index] = lane;
-    if (HAS_EXTRAS) store_extras(index);
+    render(lane);
+    // A lane without an atom has no state.
+    if (lane.atom == NONE) lanes[index].atom = NONE;
+    else lanes[index] = lane;
+    if (HAS_EXTRAS && lane.atom != NONE) store_extras(lane.atom);
 }

@@ -466,23 +466,35 @@ pub struct RenderConstants {
     pub unused: [u32; 3],
 }
 
-/// What a dispatch does: lanes `0..lanes` render the atoms (block `first_block` + a / pixels, pixel a mod pixels) with
-/// a = `first_atom` + lane.
+/// What a slice renders: the atoms `0..atoms`, atom i being block `first_block` + a / pixels of pixel a mod pixels with
+/// a = `first_atom` + i. Lanes `0..lanes` take them from a [`SliceQueue`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct SliceConstants {
     /// First atom, counted within `first_block`.
     pub first_atom: u32,
-    /// Number of lanes that have an atom.
+    /// Number of lanes.
     pub lanes: u32,
     /// Aligned block of 16 sample indices that `first_atom` belongs to.
     pub first_block: u32,
-    /// A lane saves its state after this many rays and goes on in the next dispatch.
+    /// A lane saves its state after this many rays of an atom and goes on in the next dispatch.
     pub ray_budget: u32,
     /// 1 if the lanes go on from their saved state.
     pub resume: u32,
+    /// Number of atoms.
+    pub atoms: u32,
     /// Unused, zero.
-    pub unused: [u32; 3],
+    pub unused: [u32; 2],
+}
+
+/// The atoms of a slice, of which a lane takes the next when it has finished one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct SliceQueue {
+    /// Times that an atom was asked for; beyond `atoms` there was none.
+    pub taken: u32,
+    /// Atoms that are complete.
+    pub done: u32,
 }
 
 /// Samples of an aligned block.
@@ -504,10 +516,10 @@ pub struct BlockResult {
     pub non_finite: u32,
     /// Bit i: a path of sample i was cut off by the safety cap on bounces.
     pub capped: u32,
-    /// 1 when the atom is complete, 0 while its lane must be resumed.
-    pub complete: u32,
     /// Paths that were ended in this block (samples).
     pub samples: u32,
+    /// Unused, zero.
+    pub unused: u32,
 }
 
 /// Bits of the AOVs that a kernel sums, by number (`AOVS` of shaders/include/features.glsl).

@@ -38,6 +38,8 @@ struct LaneState {
     Media media;           // that the path's ray, or after the shadow ray the scattered one, is in
     uint pane_search;      // the shadow ray looks for the nearest surface: 1 + panes passed; else 0
     float passed;          // from the last vertex that was no pane to the origin of the path's ray
+    uint atom;             // of the slice, NONE if the lane has none
+    uint ray_limit;        // rays of the atom at which the lane waits for the next dispatch
 };
 
 // Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
@@ -48,18 +50,12 @@ uvec2 pixel_of_index(RenderConstants constants, uint index) {
     return uvec2(tile % tiles_across, tile / tiles_across) * 8u + uvec2(inside % 8u, inside / 8u);
 }
 
-LaneState new_lane(RenderConstants constants, SliceConstants slice, uint index) {
-    uint pixels = ((constants.width + 7u) / 8u) * ((constants.height + 7u) / 8u) * 64u;
-    uint atom = slice.first_atom + index;
-    uvec2 pixel = pixel_of_index(constants, atom % pixels);
-    uint first = (slice.first_block + atom / pixels) * BLOCK_SAMPLES;
-    bool outside = pixel.x >= constants.width || pixel.y >= constants.height;
+LaneState idle_lane() {
     LaneState lane;
     lane.ray = Ray(vec3(0.0), vec3(0.0), 0.0, false, NO_TRIANGLE, NO_TRIANGLE);
-    lane.pixel = pixel.x | pixel.y << 16u;
-    lane.sample_index = max(first, constants.first_sample);
-    // The last block may end at sample index 2^32 − 1.
-    lane.end_sample = outside ? lane.sample_index : first + min(BLOCK_SAMPLES, constants.end_sample - first);
+    lane.pixel = 0u;
+    lane.sample_index = 0u;
+    lane.end_sample = 0u;
     lane.bounce = 0u;
     lane.throughput = vec3(1.0);
     lane.radiance_scale = 1.0;
@@ -83,7 +79,31 @@ LaneState new_lane(RenderConstants constants, SliceConstants slice, uint index) 
     lane.media = OUTSIDE;
     lane.pane_search = 0u;
     lane.passed = 0.0;
+    lane.atom = NONE;
+    lane.ray_limit = 0u;
     return lane;
+}
+
+// Gives the lane an atom of the slice; it has no samples if its pixel is outside of the image.
+void begin_atom(inout LaneState lane, RenderConstants constants, SliceConstants slice, uint index) {
+    uint pixels = ((constants.width + 7u) / 8u) * ((constants.height + 7u) / 8u) * 64u;
+    uint atom = slice.first_atom + index;
+    uvec2 pixel = pixel_of_index(constants, atom % pixels);
+    uint first = (slice.first_block + atom / pixels) * BLOCK_SAMPLES;
+    bool outside = pixel.x >= constants.width || pixel.y >= constants.height;
+    lane.atom = index;
+    lane.ray_limit = slice.ray_budget;
+    lane.pixel = pixel.x | pixel.y << 16u;
+    lane.sample_index = max(first, constants.first_sample);
+    // The last block may end at sample index 2^32 − 1.
+    lane.end_sample = outside ? lane.sample_index : first + min(BLOCK_SAMPLES, constants.end_sample - first);
+    lane.rays = 0u;
+    lane.non_finite = 0u;
+    lane.capped = 0u;
+    lane.sum = vec3(0.0);
+    lane.luminance_squared = 0.0;
+    lane.compensation = vec3(0.0);
+    lane.samples = 0u;
 }
 
 // Adds to the block's sum without losing what rounding cuts off (Knuth's TwoSum): the sum of the integrators' images is
@@ -96,10 +116,9 @@ void accumulate(inout LaneState lane, vec3 light) {
     lane.compensation += lost;
 }
 
-BlockResult block_result(LaneState lane, bool complete) {
+BlockResult block_result(LaneState lane) {
     return BlockResult(lane.sum.x, lane.sum.y, lane.sum.z, lane.luminance_squared, lane.compensation.x,
-                       lane.compensation.y, lane.compensation.z, lane.rays, lane.non_finite, lane.capped,
-                       complete ? 1u : 0u, lane.samples);
+                       lane.compensation.y, lane.compensation.z, lane.rays, lane.non_finite, lane.capped, lane.samples, 0u);
 }
 
 #endif

@@ -122,9 +122,14 @@ struct SliceConstants {
     uint first_block;
     uint ray_budget;
     uint resume;
+    uint atoms;
     uint unused_0;
     uint unused_1;
-    uint unused_2;
+};
+
+struct SliceQueue {
+    uint taken;
+    uint done;
 };
 
 struct BlockResult {
@@ -138,8 +143,8 @@ struct BlockResult {
     uint rays;
     uint non_finite;
     uint capped;
-    uint complete;
     uint samples;
+    uint unused;
 };
 
 struct AovSums {

@@ -278,10 +278,13 @@ void trace_step(inout Trace trace, RenderConstants constants) {
 
 // Steps until the next look at which lanes are done: more leave finished lanes idle, fewer shade for few lanes. Where shading
 // looks up textures, it costs so much more than a step that nearly all lanes should shade together (docs/benchmarks).
-const int STEPS_PER_ADVANCE = HAS_TEXTURES ? 40 : 10;
+const int STEPS_PER_ADVANCE = 6;
+const int STEPS_PER_ADVANCE_TEXTURED = 40;
 
 void trace_advance(inout Trace trace, RenderConstants constants) {
-    for (int i = 0; i < STEPS_PER_ADVANCE; ++i) {
+    int steps = STEPS_PER_ADVANCE;
+    if (HAS_TEXTURES) steps = STEPS_PER_ADVANCE_TEXTURED;
+    for (int i = 0; i < steps; ++i) {
         if (trace.current == NONE) break;
         trace_step(trace, constants);
     }

@@ -28,6 +28,8 @@ pub enum Dispatch<'a> {
         /// Bytes.
         bytes: u64,
     },
+    /// Fills a buffer, made for transfers, with zeros.
+    Clear(&'a Buffer),
     /// Records commands of its own (acceleration structure builds).
     Record(&'a dyn Fn(&ash::Device, vk::CommandBuffer)),
 }
@@ -127,6 +129,10 @@ impl Submission {
                 // SAFETY: both buffers are at least `bytes` long and have the transfer usages.
                 unsafe { device.cmd_copy_buffer(self.commands, from.raw, to.raw, &region) };
             }
+            // SAFETY: the buffer has the transfer usage.
+            Dispatch::Clear(buffer) => unsafe {
+                device.cmd_fill_buffer(self.commands, buffer.raw, 0, vk::WHOLE_SIZE, 0);
+            },
             Dispatch::Record(record) => record(device, self.commands),
         }
     }

@@ -34,9 +34,9 @@ pub struct BindingOverride {
     pub array_form: Option<(ArrayForm, u32)>,
     /// Lanes of a workgroup.
     pub workgroup_size: Option<u32>,
-    /// Lanes of every slice.
-    pub slice_lanes: Option<u32>,
-    /// Rays a lane may trace in one dispatch.
+    /// Atoms of every slice.
+    pub slice_atoms: Option<u32>,
+    /// Rays of an atom that a lane may trace in one dispatch.
     pub ray_budget: Option<u32>,
     /// The driver puts in the specialisation constants, not [`crate::gpu::specialize`].
     pub driver_specializes: bool,
@@ -93,9 +93,9 @@ impl PathTracer {
             Usage::UNIFORM_BUFFER,
             MemoryUse::Upload,
         )?;
-        let slice_lanes = overrides.slice_lanes.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
+        let slice_atoms = overrides.slice_atoms.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
         let mut key = KernelKey::new(prepared, camera, settings, trace, form);
-        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes, &key)).collect();
+        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_atoms, &key)).collect();
         let mut slices = slices?;
         let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
@@ -189,7 +189,7 @@ impl PathTracer {
         }
         self.constants.seed = seed;
         let looks = Looks::new(plan.samples.clone(), plan.target_error);
-        let mut sizes = SliceSizes::new(self.overrides, self.slices[0].lanes());
+        let mut sizes = SliceSizes::new(self.overrides, self.slices[0].atoms());
         let mut run = Run::new(&self.constants, plan, &self.key);
         // An open end is no total.
         let mut expected = (plan.samples.end < u32::MAX).then(|| plan.samples.end - plan.samples.start);
@@ -235,7 +235,7 @@ impl PathTracer {
             }
             while run.stopped_by == StopReason::Samples && !schedule.is_done() {
                 let Some(slot) = free.pop() else { break };
-                let constants = schedule.next(sizes.next_lanes(), sizes.ray_budget());
+                let constants = schedule.next(sizes.next_atoms(), self.slices[slot].lanes(), sizes.ray_budget());
                 self.slices[slot].submit(&self.kernel, slot, constants)?;
                 in_flight.push_back(slot);
             }
@@ -244,11 +244,11 @@ impl PathTracer {
             let outcome = self.slices[slot].finish(&self.kernel, slot, last_end)?;
             last_end = Instant::now();
             sizes.observe(&outcome);
-            let (slice, lanes) = (&self.slices[slot], outcome.constants.lanes);
+            let (slice, atoms) = (&self.slices[slot], outcome.constants.atoms);
             let brought = SliceResults {
-                results: slice.results(lanes)?,
-                aovs: slice.aovs(lanes)?,
-                counters: slice.counters(lanes)?,
+                results: slice.results(atoms)?,
+                aovs: slice.aovs(atoms)?,
+                counters: slice.counters(atoms)?,
             };
             run.add(&self.constants, &outcome, &brought, self.origin);
             free.push(slot);
@@ -334,6 +334,7 @@ fn build_kernel(
             set.extend(buffers.acceleration.as_ref().map(|a| (4, BindingResource::AccelerationStructure(a))));
             set.push((5, BindingResource::Storage(slice.aovs.as_ref().unwrap_or(&slice.results))));
             set.push((6, BindingResource::Storage(slice.counters.as_ref().unwrap_or(&slice.results))));
+            set.push((7, BindingResource::Storage(&slice.queue)));
             set
         })
         .collect();

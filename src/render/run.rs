@@ -115,19 +115,19 @@ impl Run {
         if let (Some(statistics), Some(counters)) = (&mut self.statistics, slice.counters) {
             statistics.add(outcome, counters);
         }
-        for (lane, result) in slice.results.iter().enumerate() {
+        for (index, result) in slice.results.iter().enumerate() {
             if result.samples == 0 {
                 continue;
             }
-            let atom = u64::from(outcome.constants.first_atom) + lane as u64;
+            let atom = u64::from(outcome.constants.first_atom) + index as u64;
             let (x, y) = pixel_of_index(constants, atom % pixels);
             let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
             let pixel = y as usize * constants.width as usize + x as usize;
             let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
             self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples);
             if let (Some(film), Some(aovs)) = (&mut self.aovs, slice.aovs) {
-                film.add_block(pixel, &aov_sample(&aovs[lane], origin));
-                self.saturated_costs += u64::from(aovs[lane].visits == u32::MAX);
+                film.add_block(pixel, &aov_sample(&aovs[index], origin));
+                self.saturated_costs += u64::from(aovs[index].visits == u32::MAX);
             }
             if let Some(replicates) = &mut self.replicates {
                 replicates.add_block(pixel, block, sum, result.samples);
@@ -145,7 +145,7 @@ impl Run {
     }
 }
 
-/// What the lanes of a slice have brought.
+/// What the atoms of a slice have brought.
 pub(super) struct SliceResults<'a> {
     pub(super) results: &'a [BlockResult],
     pub(super) aovs: Option<&'a [AovSums]>,

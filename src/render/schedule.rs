@@ -22,16 +22,18 @@ impl Schedule {
         self.next_atom >= self.atoms
     }
 
-    pub(super) fn next(&mut self, lanes: u32, ray_budget: u32) -> SliceConstants {
-        let lanes = lanes.min(u32::try_from(self.atoms - self.next_atom).unwrap_or(u32::MAX));
+    /// The next slice, of at most so many atoms and lanes.
+    pub(super) fn next(&mut self, atoms: u32, lanes: u32, ray_budget: u32) -> SliceConstants {
+        let atoms = atoms.min(u32::try_from(self.atoms - self.next_atom).unwrap_or(u32::MAX));
         let constants = SliceConstants {
             first_atom: (self.next_atom % self.pixels) as u32,
-            lanes,
+            lanes: lanes.min(atoms),
+            atoms,
             first_block: self.first_block + (self.next_atom / self.pixels) as u32,
             ray_budget,
             ..SliceConstants::default()
         };
-        self.next_atom += u64::from(lanes);
+        self.next_atom += u64::from(atoms);
         constants
     }
 }

@@ -1,5 +1,6 @@
 //! Slices: dispatches short enough that no driver's watchdog fires and an interrupt is answered at once. The first is
-//! tiny, growth is at most twofold, two are in flight. A lane that has used up its ray budget is resumed.
+//! tiny, growth is at most twofold, two are in flight. The lanes take a slice's atoms one after the other, so that none waits
+//! for another's while there are more. A lane that has used up its ray budget is resumed.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -10,26 +11,31 @@ use super::kernel_key::KernelKey;
 use super::path_tracer::BindingOverride;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
-use crate::layout::{AovSums, BlockResult, LANE_STATE_BYTES, RayCounters, SliceConstants};
+use crate::layout::{AovSums, BlockResult, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue};
 
 /// Slices that are submitted before the oldest is read.
 pub(super) const SLICES_IN_FLIGHT: usize = 2;
 /// Time a slice should take.
 const TARGET: Duration = Duration::from_millis(75);
-/// Lanes of the first slice, and of the smallest.
-const FIRST_LANES: u32 = 256;
+/// Atoms of the first slice, and of the smallest.
+const FIRST_ATOMS: u32 = 256;
+/// Most lanes of a slice on a CPU: its threads run workgroups one after the other, so the first take nearly all atoms. More
+/// would find none left, fewer would not reach all threads.
+const MOST_CPU_LANES: u32 = 1 << 13;
 
 /// Buffers and the submission of one slice.
 pub(super) struct Slice {
     pub(super) results: Buffer,
     pub(super) lane_states: Buffer,
-    /// [`AovSums`] a lane, if the kernel sums AOVs.
+    pub(super) queue: Buffer,
+    /// [`AovSums`] an atom, if the kernel sums AOVs.
     pub(super) aovs: Option<Buffer>,
-    /// [`RayCounters`] a lane, if it counts.
+    /// [`RayCounters`] an atom, if it counts.
     pub(super) counters: Option<Buffer>,
     submission: Submission,
     constants: SliceConstants,
     submitted: Instant,
+    atoms: u32,
     lanes: u32,
 }
 
@@ -44,8 +50,10 @@ pub(super) struct SliceOutcome {
 }
 
 impl Slice {
-    pub(super) fn new(gpu: &Arc<Gpu>, lanes: u32, key: &KernelKey) -> Result<Self> {
-        let bytes = |each: usize| u64::from(lanes) * each as u64;
+    /// A slice of at most so many atoms.
+    pub(super) fn new(gpu: &Arc<Gpu>, atoms: u32, key: &KernelKey) -> Result<Self> {
+        let lanes = if gpu.info.kind == DeviceKind::Cpu { atoms.min(MOST_CPU_LANES) } else { atoms };
+        let bytes = |each: usize| u64::from(atoms) * each as u64;
         let readback = |name, each| Buffer::new(gpu, name, bytes(each), Usage::STORAGE_BUFFER, MemoryUse::Readback);
         Ok(Self {
             results: readback("block results", size_of::<BlockResult>())?,
@@ -54,25 +62,38 @@ impl Slice {
             lane_states: Buffer::new(
                 gpu,
                 "lane states",
-                bytes(LANE_STATE_BYTES),
+                u64::from(lanes) * LANE_STATE_BYTES as u64,
                 Usage::STORAGE_BUFFER,
                 MemoryUse::Device,
+            )?,
+            queue: Buffer::new(
+                gpu,
+                "slice queue",
+                size_of::<SliceQueue>() as u64,
+                Usage::STORAGE_BUFFER | Usage::TRANSFER_DST,
+                MemoryUse::Readback,
             )?,
             submission: Submission::new(gpu, "path_trace")?,
             constants: SliceConstants::default(),
             submitted: Instant::now(),
+            atoms,
             lanes,
         })
     }
 
-    /// Most lanes it can hold.
+    /// Most atoms it can hold.
+    pub(super) fn atoms(&self) -> u32 {
+        self.atoms
+    }
+
+    /// Its lanes.
     pub(super) fn lanes(&self) -> u32 {
         self.lanes
     }
 
     pub(super) fn bytes(&self) -> u64 {
         let extras = [&self.aovs, &self.counters].into_iter().flatten().map(|buffer| buffer.size).sum::<u64>();
-        self.results.size + self.lane_states.size + extras
+        self.results.size + self.lane_states.size + self.queue.size + extras
     }
 
     pub(super) fn submit(&mut self, kernel: &Kernel, set: usize, constants: SliceConstants) -> Result<()> {
@@ -90,24 +111,29 @@ impl Slice {
 
     fn dispatch(&mut self, kernel: &Kernel, set: usize) -> Result<()> {
         let push = bytemuck::bytes_of(&self.constants);
-        self.submission.submit(&[Dispatch::Run { kernel, set, push, lanes: self.constants.lanes }])?;
+        let run = Dispatch::Run { kernel, set, push, lanes: self.constants.lanes };
+        if self.constants.resume == 1 {
+            self.submission.submit(&[run])?;
+        } else {
+            self.submission.submit(&[Dispatch::Clear(&self.queue), run])?;
+        }
         Ok(())
     }
 
-    /// Waits until every lane is done, resuming those that have used up their budget. `before` is when the slice before it
+    /// Waits until every atom is done, resuming the lanes that have used up their budget. `before` is when the slice before it
     /// ended.
     pub(super) fn finish(&mut self, kernel: &Kernel, set: usize, before: Instant) -> Result<SliceOutcome> {
         let mut dispatches = 1;
         loop {
             self.submission.wait()?;
-            if self.results(self.constants.lanes)?.iter().all(|result| result.complete == 1) {
+            if self.queue.read::<SliceQueue>(1)?[0].done == self.constants.atoms {
                 break;
             }
             self.constants.resume = 1;
             dispatches += 1;
             self.dispatch(kernel, set)?;
         }
-        let rays = self.results(self.constants.lanes)?.iter().map(|result| u64::from(result.rays)).sum();
+        let rays = self.results(self.constants.atoms)?.iter().map(|result| u64::from(result.rays)).sum();
         Ok(SliceOutcome {
             constants: self.constants,
             seconds: self.submitted.elapsed().as_secs_f64(),
@@ -117,46 +143,46 @@ impl Slice {
         })
     }
 
-    pub(super) fn aovs(&self, lanes: u32) -> Result<Option<&[AovSums]>> {
-        Ok(self.aovs.as_ref().map(|buffer| buffer.read(lanes as usize)).transpose()?)
+    pub(super) fn aovs(&self, atoms: u32) -> Result<Option<&[AovSums]>> {
+        Ok(self.aovs.as_ref().map(|buffer| buffer.read(atoms as usize)).transpose()?)
     }
 
-    pub(super) fn counters(&self, lanes: u32) -> Result<Option<&[RayCounters]>> {
-        Ok(self.counters.as_ref().map(|buffer| buffer.read(lanes as usize)).transpose()?)
+    pub(super) fn counters(&self, atoms: u32) -> Result<Option<&[RayCounters]>> {
+        Ok(self.counters.as_ref().map(|buffer| buffer.read(atoms as usize)).transpose()?)
     }
 
-    pub(super) fn results(&self, lanes: u32) -> Result<&[BlockResult]> {
-        Ok(self.results.read(lanes as usize)?)
+    pub(super) fn results(&self, atoms: u32) -> Result<&[BlockResult]> {
+        Ok(self.results.read(atoms as usize)?)
     }
 }
 
 /// How large the next slice may be, from how long the last ones took.
 pub(super) struct SliceSizes {
-    lanes: u32,
+    atoms: u32,
     largest: u32,
     ray_budget: u32,
-    fixed_lanes: bool,
+    fixed_atoms: bool,
     fixed_budget: bool,
 }
 
 impl SliceSizes {
-    /// Most lanes that are of use on a class of devices.
+    /// Most atoms of a slice on a class of devices.
     pub(super) fn largest(kind: DeviceKind) -> u32 {
         if kind == DeviceKind::Cpu { 1 << 15 } else { 1 << 19 }
     }
 
     pub(super) fn new(overrides: BindingOverride, largest: u32) -> Self {
         Self {
-            lanes: overrides.slice_lanes.unwrap_or(FIRST_LANES).min(largest),
+            atoms: overrides.slice_atoms.unwrap_or(FIRST_ATOMS).min(largest),
             largest,
             ray_budget: overrides.ray_budget.unwrap_or(1024),
-            fixed_lanes: overrides.slice_lanes.is_some(),
+            fixed_atoms: overrides.slice_atoms.is_some(),
             fixed_budget: overrides.ray_budget.is_some(),
         }
     }
 
-    pub(super) fn next_lanes(&self) -> u32 {
-        self.lanes
+    pub(super) fn next_atoms(&self) -> u32 {
+        self.atoms
     }
 
     pub(super) fn ray_budget(&self) -> u32 {
@@ -166,14 +192,14 @@ impl SliceSizes {
     /// Grows or shrinks towards the target. A slice waits for the one before it, so its time is at most twice its own.
     pub(super) fn observe(&mut self, outcome: &SliceOutcome) {
         let own = outcome.seconds / SLICES_IN_FLIGHT as f64;
-        if !self.fixed_lanes {
+        if !self.fixed_atoms {
             let factor = (TARGET.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
-            let wanted = f64::from(outcome.constants.lanes) * factor;
-            self.lanes = (wanted as u32).clamp(FIRST_LANES.min(self.largest), self.largest);
+            let wanted = f64::from(outcome.constants.atoms) * factor;
+            self.atoms = (wanted as u32).clamp(FIRST_ATOMS.min(self.largest), self.largest);
         }
         if !self.fixed_budget {
             // Most atoms end within a few times the mean; the rest go on in another dispatch.
-            let mean = outcome.rays / u64::from(outcome.constants.lanes.max(1));
+            let mean = outcome.rays / u64::from(outcome.constants.atoms.max(1));
             self.ray_budget = u32::try_from(8 * mean).unwrap_or(u32::MAX).clamp(256, 1 << 16);
         }
     }

@@ -232,11 +232,11 @@ fn slices_and_budgets_do_not_change_a_bit() {
             gpu::run(&mut tracer, 3, 40)
         };
         let reference = with(BindingOverride::default());
-        for (slice_lanes, workgroup_size, ray_budget) in
+        for (slice_atoms, workgroup_size, ray_budget) in
             [(Some(1000), Some(32), None), (Some(4096), Some(128), Some(3)), (None, None, Some(50))]
         {
-            let other = with(BindingOverride { slice_lanes, workgroup_size, ray_budget, ..BindingOverride::default() });
-            assert_eq!(reference.aovs, other.aovs, "{name}: {slice_lanes:?} {workgroup_size:?} {ray_budget:?}");
+            let other = with(BindingOverride { slice_atoms, workgroup_size, ray_budget, ..BindingOverride::default() });
+            assert_eq!(reference.aovs, other.aovs, "{name}: {slice_atoms:?} {workgroup_size:?} {ray_budget:?}");
         }
     }
 }

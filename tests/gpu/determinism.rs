@@ -36,10 +36,10 @@ fn bits(film: &Film) -> Vec<[u64; 4]> {
 fn slices_workgroups_and_budgets_do_not_change_a_bit() {
     for name in some(&["instances", "cornell_spheres", "alpha"]) {
         let reference = film(name, &settings(), BindingOverride::default(), 0..40);
-        for (slice_lanes, workgroup_size, ray_budget) in
+        for (slice_atoms, workgroup_size, ray_budget) in
             [(None, None, None), (Some(1000), Some(32), None), (Some(4096), Some(128), Some(3)), (None, None, Some(50))]
         {
-            let overrides = BindingOverride { slice_lanes, workgroup_size, ray_budget, ..BindingOverride::default() };
+            let overrides = BindingOverride { slice_atoms, workgroup_size, ray_budget, ..BindingOverride::default() };
             let other = film(name, &settings(), overrides, 0..40);
             assert_eq!(bits(&reference), bits(&other), "{name}, {overrides:?}");
         }

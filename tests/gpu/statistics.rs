@@ -165,7 +165,7 @@ fn counts_add_up_and_do_not_depend_on_slices() {
                 cost[0].iter().zip(run.film.pixels()).map(|(mean, pixel)| mean * f64::from(pixel.count)).sum();
             assert_eq!(sum.round(), (all.nodes + all.triangles) as f64, "{name}");
         }
-        let cut = of(BindingOverride { slice_lanes: Some(1000), ray_budget: Some(7), ..BindingOverride::default() });
+        let cut = of(BindingOverride { slice_atoms: Some(1000), ray_budget: Some(7), ..BindingOverride::default() });
         let other = cut.statistics.as_ref().expect("asked for");
         assert_eq!(
             (statistics.camera, statistics.scattered, statistics.shadow),
