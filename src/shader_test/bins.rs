@@ -12,11 +12,21 @@ const LEAST_CUTS: u32 = 4;
 /// The most, which makes 256 bins of a hemisphere.
 const MOST_CUTS: u32 = 8;
 
+/// From so few samples nothing is concluded about their density.
+const FEW: usize = 16;
+/// Where a half of a cell holds this share of its samples, the density in it is too uneven for a quadrature. Of 64 samples
+/// of an even density a half holds so many by chance in one cell of a thousand.
+const UNEVEN: f64 = 0.7;
+/// A piece is cut in two this many times, at most.
+const MOST_HALVINGS: u32 = 48;
+
 /// A binary tree over both hemispheres; its leaves are the bins.
 pub struct Bins {
     nodes: Vec<Node>,
     /// The bins.
     pub cells: Vec<Cell>,
+    /// What each bin is made of, for a quadrature: pieces that get smaller towards where the samples are dense.
+    pub pieces: Vec<(usize, Cell)>,
 }
 
 enum Node {
@@ -32,7 +42,7 @@ impl Bins {
             let (below, radius, turns) = coordinates(*sample);
             points[usize::from(below)].push([radius, turns]);
         }
-        let mut bins = Self { nodes: Vec::new(), cells: Vec::new() };
+        let mut bins = Self { nodes: Vec::new(), cells: Vec::new(), pieces: Vec::new() };
         // The first two nodes are the hemispheres.
         bins.nodes.extend([Node::Leaf(0), Node::Leaf(0)]);
         let [mut above, mut below] = points;
@@ -44,7 +54,7 @@ impl Bins {
     fn build(&mut self, node: usize, cell: Cell, points: &mut [[f64; 2]], cuts: u32) {
         let few = points.len() < 2 * SMALLEST_BIN;
         if cuts >= if few { LEAST_CUTS } else { MOST_CUTS } {
-            return self.leaf(node, cell);
+            return self.leaf(node, cell, points);
         }
         let along_radius = cuts % 2 == 1;
         let range = if along_radius { cell.radius } else { cell.turns };
@@ -62,9 +72,37 @@ impl Bins {
         self.build(first + 1, other, high, cuts + 1);
     }
 
-    fn leaf(&mut self, node: usize, cell: Cell) {
+    fn leaf(&mut self, node: usize, cell: Cell, points: &mut [[f64; 2]]) {
         self.nodes[node] = Node::Leaf(self.cells.len());
+        self.cut_where_dense(cell, points, 0);
         self.cells.push(cell);
+    }
+
+    /// A narrow lobe in a wide bin lies between the nodes of a quadrature, which then knows nothing of it. Halving the cell
+    /// wherever most samples are in one half makes pieces whose size is in proportion to their distance from the lobe.
+    fn cut_where_dense(&mut self, cell: Cell, points: &mut [[f64; 2]], halvings: u32) {
+        let uneven = |axis: usize, range: [f64; 2]| {
+            let share = |low: f64, high: f64| {
+                let width = range[1] - range[0];
+                let (low, high) = (range[0] + low * width, range[0] + high * width);
+                points.iter().filter(|point| low <= point[axis] && point[axis] < high).count() as f64
+                    / points.len() as f64
+            };
+            share(0.0, 0.5).max(share(0.25, 0.75)).max(share(0.5, 1.0))
+        };
+        let [radius, turns] = [uneven(0, cell.radius), uneven(1, cell.turns)];
+        if points.len() < FEW || halvings >= MOST_HALVINGS || radius.max(turns) < UNEVEN {
+            self.pieces.push((self.cells.len(), cell));
+            return;
+        }
+        let along_radius = radius > turns;
+        let (axis, range) = if along_radius { (0, cell.radius) } else { (1, cell.turns) };
+        let middle = 0.5 * (range[0] + range[1]);
+        points.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+        let (low, high) = points.split_at_mut(points.partition_point(|point| point[axis] < middle));
+        let [one, other] = cell.cut(along_radius, middle);
+        self.cut_where_dense(one, low, halvings + 1);
+        self.cut_where_dense(other, high, halvings + 1);
     }
 
     /// The bin that a direction falls in.
@@ -118,6 +156,25 @@ mod tests {
         let area: f64 =
             bins.cells.iter().map(|c| (c.radius[1].powi(2) - c.radius[0].powi(2)) * (c.turns[1] - c.turns[0])).sum();
         assert!((area - 2.0).abs() < 1e-12, "{area}");
+    }
+
+    #[test]
+    fn pieces_are_small_where_a_few_samples_are_close_together() {
+        // One sample in fifty is in a spot of 10⁻⁴ radians.
+        let spot = |i: u32| DVec3::new(0.6 + 1e-4 * f64::from(i % 7) / 7.0, 0.8, 1e-4 * f64::from(i % 11) / 11.0);
+        let samples: Vec<DVec3> =
+            directions(1 << 14).into_iter().zip(0..).map(|(w, i)| if i % 50 == 0 { spot(i) } else { w }).collect();
+        let bins = Bins::new(&samples);
+        let radius = (1.0_f64 - 0.8).sqrt();
+        let at_spot = bins.pieces.iter().filter(|(_, c)| c.radius[0] <= radius && radius < c.radius[1] + 1e-6);
+        let smallest = at_spot.map(|(_, c)| c.radius[1] - c.radius[0]).fold(1.0, f64::min);
+        assert!(smallest < 1e-3, "{smallest}");
+        let whole = |bin: usize, cell: &Cell| {
+            let area = |c: &Cell| (c.radius[1] - c.radius[0]) * (c.turns[1] - c.turns[0]);
+            let parts: f64 = bins.pieces.iter().filter(|(owner, _)| *owner == bin).map(|(_, c)| area(c)).sum();
+            (parts / area(cell) - 1.0).abs() < 1e-9
+        };
+        assert!(bins.cells.iter().enumerate().all(|(bin, cell)| whole(bin, cell)));
     }
 
     #[test]

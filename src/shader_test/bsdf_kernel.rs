@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::configuration::Configuration;
 use super::device::MOST_LANES;
+use super::report::{number, vector};
 use crate::Result;
 use crate::layout::Texel;
 use crate::render::FunctionKernel;
@@ -47,7 +48,8 @@ impl Sample {
     pub(super) fn fault(&self) -> Option<String> {
         let fine = self.wi.is_finite() && is_amount(self.weight) && is_amount(DVec3::splat(self.pdf));
         (!fine).then(|| {
-            format!("a sample is negative or not finite: wi {}, weight {}, pdf {}", self.wi, self.weight, self.pdf)
+            let [wi, weight, pdf] = [vector(self.wi), vector(self.weight), number(self.pdf)];
+            format!("a sample is negative or not finite: wi {wi}, weight {weight}, pdf {pdf}")
         })
     }
 }
@@ -65,7 +67,11 @@ impl Value {
     /// What is not finite or is negative of it, in words.
     pub(super) fn fault(&self, wi: DVec3) -> Option<String> {
         let fine = is_amount(self.f) && is_amount(DVec3::splat(self.pdf)) && is_amount(self.reverse_f);
-        (!fine).then(|| format!("a value is negative or not finite towards wi {wi}: f {}, pdf {}", self.f, self.pdf))
+        (!fine).then(|| {
+            let [wi, f, pdf] = [vector(wi), vector(self.f), number(self.pdf)];
+            let reverse = if is_amount(self.reverse_f) { "" } else { " (or with the directions exchanged)" };
+            format!("a value is negative or not finite towards wi {wi}{reverse}: f {f}, pdf {pdf}")
+        })
     }
 }
 
@@ -88,8 +94,8 @@ impl BsdfKernel {
             let inputs = header(configurations, samples, seed ^ index << 16);
             let lanes = configurations.len() as u32 * samples;
             let sample = |texels: &[Texel]| Sample {
-                wi: vector(texels[0]),
-                weight: vector(texels[1]),
+                wi: unpacked(texels[0]),
+                weight: unpacked(texels[1]),
                 pdf: f32::from_bits(texels[1][3]).into(),
                 flags: texels[0][3],
             };
@@ -115,9 +121,9 @@ impl BsdfKernel {
                 let mut inputs = header(configurations, 0, reverse.into());
                 inputs.extend(at.iter().map(|(index, wi)| vector_texel(*wi, (index - first) as u32)));
                 let value = |texels: &[Texel]| Value {
-                    f: vector(texels[0]),
+                    f: unpacked(texels[0]),
                     pdf: f32::from_bits(texels[0][3]).into(),
-                    reverse_f: vector(texels[1]),
+                    reverse_f: unpacked(texels[1]),
                 };
                 result.extend(self.kernel.run(&inputs, at.len() as u32, 2)?.chunks_exact(2).map(value));
             }
@@ -138,7 +144,7 @@ fn header(configurations: &[Configuration], samples: u32, word: u32) -> Vec<Texe
     texels
 }
 
-fn vector([x, y, z, _]: Texel) -> DVec3 {
+fn unpacked([x, y, z, _]: Texel) -> DVec3 {
     DVec3::from([x, y, z].map(|bits| f64::from(f32::from_bits(bits))))
 }
 

@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use glam::DVec3;
 use serde_json::json;
 
-use super::bsdf_kernel::{BsdfKernel, Sample, Value};
+use super::bsdf_kernel::{BsdfKernel, Sample};
 use super::bsdf_statistics::fixed_directions;
 use super::configuration::Configuration;
-use super::report::CheckReport;
+use super::report::{CheckReport, number, vector, within};
 use crate::Result;
 
 /// Samples of a configuration.
@@ -38,20 +38,16 @@ pub(super) fn weights(
             let expected = value.f * (wi.y.abs() / value.pdf);
             let errors = [relative_error(sample.pdf, value.pdf), relative_error_of(sample.weight, expected)];
             worst.see(errors[0].max(errors[1]), label);
-            if !(errors[0] <= relative) {
-                let (got, expected) = (sample.pdf, value.pdf);
-                failures.add(
-                    label,
-                    &format!("the sample towards {wi} has pdf {got:.6}; of its direction it is {expected:.6}"),
-                );
-            } else if !(errors[1] <= relative) {
-                let got = sample.weight;
-                failures
-                    .add(label, &format!("the sample towards {wi} has weight {got:.6}; f·|cos|/pdf is {expected:.6}"));
+            if !within(errors[0], relative) {
+                let [wi, got, pdf] = [vector(wi), number(sample.pdf), number(value.pdf)];
+                failures.add(label, &format!("the sample towards {wi} has pdf {got}; of its direction it is {pdf}"));
+            } else if !within(errors[1], relative) {
+                let [wi, got, expected] = [wi, sample.weight, expected].map(vector);
+                failures.add(label, &format!("the sample towards {wi} has weight {got}; f·|cos|/pdf is {expected}"));
             }
         }
     }
-    let summary = format!("{tested} samples; largest relative error {worst}; {relative:.1e} allowed");
+    let summary = format!("{tested} samples; largest relative error {worst}; {relative} allowed");
     let numbers = json!({
         "configurations": configurations.len(), "samples": tested, "largest_error": worst.error, "allowed": relative,
         "at": worst.label,
@@ -64,16 +60,17 @@ fn shape_fault(sample: &Sample) -> Option<String> {
     let wi = sample.wi;
     if sample.is_absorbed() {
         return (sample.weight != DVec3::ZERO)
-            .then(|| format!("a sample without pdf has the weight {}", sample.weight));
+            .then(|| format!("a sample without pdf has the weight {}", vector(sample.weight)));
     }
     if (wi.length() - 1.0).abs() > UNIT {
-        return Some(format!("the direction {wi} of a sample has length {:.6}", wi.length()));
+        return Some(format!("the direction {} of a sample has length {}", vector(wi), number(wi.length())));
     }
     if sample.is_delta() && sample.pdf != 0.0 {
-        return Some(format!("a sample of a delta lobe has pdf {}; it must be 0", sample.pdf));
+        return Some(format!("a sample of a delta lobe has pdf {}; it must be 0", number(sample.pdf)));
     }
     (sample.goes_through() != (wi.y < 0.0)).then(|| {
         let (is, flag) = if wi.y < 0.0 { ("below", "lacks") } else { ("above", "has") };
+        let wi = vector(wi);
         format!("the direction {wi} of a sample is {is} the surface, and its flags {flag} SCATTERED_THROUGH")
     })
 }
@@ -96,13 +93,12 @@ pub(super) fn reciprocity(
         worst.see(error, &c.label);
         if let Some(fault) = value.fault(*wi) {
             failures.add(&c.label, &fault);
-        } else if !(error <= relative) {
-            let Value { f, reverse_f, .. } = value;
-            failures
-                .add(&c.label, &format!("f(wo, wi) is {f:.6}, f(wi, wo) {reverse_f:.6}, for wo {} and wi {wi}", c.wo));
+        } else if !within(error, relative) {
+            let [f, reverse, wo, wi] = [value.f, value.reverse_f, c.wo, *wi].map(vector);
+            failures.add(&c.label, &format!("f(wo, wi) is {f}, f(wi, wo) {reverse}, for wo {wo} and wi {wi}"));
         }
     }
-    let summary = format!("{} pairs; largest relative difference {worst}; {relative:.1e} allowed", at.len());
+    let summary = format!("{} pairs; largest relative difference {worst}; {relative} allowed", at.len());
     let numbers = json!({
         "configurations": configurations.len(), "pairs": at.len(), "largest_error": worst.error, "allowed": relative,
         "at": worst.label,
@@ -126,8 +122,11 @@ pub(super) fn finite(
         largest.see(weight, label);
         if let Some(fault) = sample.fault() {
             failures.add(label, &fault);
-        } else if largest_weight.is_some_and(|limit| !(weight <= limit)) {
-            failures.add(label, &format!("a sample towards {} has the weight {}", sample.wi, sample.weight));
+        } else if largest_weight.is_some_and(|limit| !within(weight, limit)) {
+            failures.add(
+                label,
+                &format!("a sample towards {} has the weight {}", vector(sample.wi), vector(sample.weight)),
+            );
         }
     }
     let at = directions(kernel, configurations, seed)?;
@@ -208,11 +207,6 @@ impl Worst {
 
 impl std::fmt::Display for Worst {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Errors are small, weights are not.
-        if self.error == 0.0 || self.error >= 0.01 {
-            write!(f, "{:.4} at {}", self.error, self.label)
-        } else {
-            write!(f, "{:.1e} at {}", self.error, self.label)
-        }
+        write!(f, "{} at {}", number(self.error), self.label)
     }
 }

@@ -6,7 +6,7 @@ use serde_json::json;
 use super::bsdf_expectations::{Albedo, Term};
 use super::configuration::{Configuration, Grid};
 use super::measure::Measurement;
-use super::report::{CheckReport, Level, p_of_excess, p_text, worst};
+use super::report::{CheckReport, Level, error_text, number, p_of_excess, p_text, within, worst};
 
 /// A configuration with what was measured of it.
 pub(super) type Measured<'a> = (&'a Configuration, &'a Measurement);
@@ -21,7 +21,7 @@ pub(super) fn integral(name: &str, all: &[Measured<'_>], tolerance: f64, signifi
     };
     let p = |m: &Measurement| {
         let (total, standard_error) = total(m);
-        if m.fault.is_some() || !(m.density[1] <= tolerance) {
+        if m.fault.is_some() || !within(m.density[1], tolerance) {
             0.0
         } else {
             p_of_excess(total - 1.0, tolerance, standard_error)
@@ -32,13 +32,13 @@ pub(super) fn integral(name: &str, all: &[Measured<'_>], tolerance: f64, signifi
         let share = |count| f64::from(count) / f64::from(m.samples);
         let parts =
             format!("∫ pdf {:.6}, absorbed {:.5}, delta lobes {:.5}", m.density[0], share(m.absorbed), share(m.deltas));
-        format!("{total:.6} ± {standard_error:.1e} ({parts})")
+        format!("{total:.6} ± {} ({parts})", error_text(standard_error))
     };
-    let failed = |(c, m): &&Measured<'_>| p(m) < level.each && !c.label.is_empty();
+    let failed = |(_, m): &&Measured<'_>| p(m) < level.each;
     let failure = |(c, m): &Measured<'_>| {
         let reason = if let Some(fault) = &m.fault {
             fault.clone()
-        } else if !(m.density[1] <= tolerance) {
+        } else if !within(m.density[1], tolerance) {
             format!(
                 "the density is too uneven to be integrated: {} with an error of up to {:.1e}",
                 told(m),
@@ -137,8 +137,11 @@ pub(super) fn furnace(
     let flat: Vec<(usize, &Channel)> =
         channels.iter().enumerate().flat_map(|(i, c)| c.iter().map(move |c| (i, c))).collect();
     let (index, channel) = flat[worst(flat.iter().map(|(_, channel)| -channel.excess()))];
-    let expected =
-        if exact { format!("{} ± {tolerance}", channel.expected) } else { format!("at most {}", channel.expected) };
+    let expected = if exact {
+        format!("{} ± {tolerance}", number(channel.expected))
+    } else {
+        format!("at most {}", number(channel.expected))
+    };
     let at = &all[index].0.label;
     let summary = format!("expected {expected}; furthest: {} at {at}; {}", channel.told(), level.told(6 * all.len()));
     let numbers = json!({
@@ -185,15 +188,15 @@ impl Channel {
     }
 
     fn told(&self) -> String {
-        let samples = format!("{:.5} ± {:.1e} by samples", self.samples, self.standard_error);
+        let samples = format!("{:.5} ± {} by samples", self.samples, error_text(self.standard_error));
         self.integral.map_or(samples.clone(), |(value, _)| format!("{value:.5} by quadrature, {samples}"))
     }
 
     /// What is wrong with it, in words.
     fn wrong(&self, threshold: f64) -> Option<String> {
-        let expected = if self.exact { format!("{}", self.expected) } else { format!("at most {}", self.expected) };
+        let expected = format!("{}{}", if self.exact { "" } else { "at most " }, number(self.expected));
         if let Some((value, error)) = self.integral {
-            if !(error <= self.tolerance) {
+            if !within(error, self.tolerance) {
                 return Some(format!(
                     "f is too uneven to be integrated: {value:.5} with an error of up to {error:.1e}"
                 ));
@@ -204,7 +207,7 @@ impl Channel {
                 return Some(format!("weights and f are of two models: {told}, {} that they agree", p_text(p)));
             }
             let over = if self.exact { (value - self.expected).abs() } else { value - self.expected };
-            if !(over <= self.tolerance) {
+            if !within(over, self.tolerance) {
                 return Some(format!("expected {expected} (tolerance {}), got {}", self.tolerance, self.told()));
             }
         }

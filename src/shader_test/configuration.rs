@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::expectations::{Axis, combinations};
+use super::report::number;
 
 /// Axes of the direction of view, besides the parameters.
 const DIRECTION_AXES: [&str; 2] = ["cosine", "azimuth"];
@@ -78,7 +79,7 @@ impl Grid {
         let configuration = |values: &Vec<f64>| {
             let (parameters, direction) = values.split_at(values.len() - 2);
             let named = axes.iter().zip(values).zip(&several).filter(|(_, several)| **several);
-            let label: Vec<_> = named.map(|(((name, _), value), _)| format!("{name} {value}")).collect();
+            let label: Vec<_> = named.map(|(((name, _), value), _)| format!("{name} {}", number(*value))).collect();
             if !(direction[0] > 0.0 && direction[0] <= 1.0) {
                 return Err(format!("cosine {}: expected a number above 0 and up to 1", direction[0]));
             }

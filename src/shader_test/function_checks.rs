@@ -9,7 +9,7 @@ use super::expectations::combinations;
 use super::function_expectations::{
     Draw, FunctionCheck, FunctionExpectations, FunctionTest, Mean, Number, Range, Uniform, Values, number_of,
 };
-use super::report::{CheckReport, Level, p_text, worst};
+use super::report::{CheckReport, Level, error_text, number, p_text, within, worst};
 use crate::Result;
 use crate::bench::statistics::{Summary, t_two_sided};
 use crate::layout::Texel;
@@ -49,18 +49,22 @@ impl Function<'_> {
                     if got == expected || got.is_nan() && expected.is_nan() { 0.0 } else { (got - expected).abs() };
                 let allowed = values.absolute + values.relative * expected.abs();
                 largest = if error.is_nan() { f64::INFINITY } else { largest.max(error) };
-                if !(error <= allowed) {
+                if !within(error, allowed) {
                     let at = told(&expectations.inputs, input);
                     let name = &number.name;
-                    failures.push(format!("{at}: {name} is {got:?}, expected {expected:?} ± {allowed:.1e}"));
+                    failures
+                        .push(format!("{at}: {name} is {got:?}, expected {expected:?} ± {}", self::number(allowed)));
                 }
             }
         }
         let (absolute, relative) = (values.absolute, values.relative);
-        let summary = format!(
-            "{} rows; largest error {largest:.1e}; {absolute:.1e} + {relative:.1e} of the value allowed",
-            values.rows.len()
-        );
+        let allowed = match (absolute, relative) {
+            (0.0, 0.0) => String::from("none"),
+            (absolute, 0.0) => format!("{absolute}"),
+            (0.0, relative) => format!("{relative} of the value"),
+            (absolute, relative) => format!("{absolute} + {relative} of the value"),
+        };
+        let summary = format!("{} rows; largest error {}; {allowed} allowed", values.rows.len(), number(largest));
         let numbers = json!({
             "rows": values.rows.len(), "largest_error": largest, "absolute": absolute, "relative": relative,
         });
@@ -78,7 +82,7 @@ impl Function<'_> {
             for ((number, got), [least, greatest]) in expectations.outputs.iter().zip(got).zip(&mut limits) {
                 (*least, *greatest) = (least.min(got), greatest.max(got));
                 let [low, high] = range.within.get(&number.name).copied().unwrap_or([f64::MIN, f64::MAX]);
-                if !(low <= got && got <= high) {
+                if !(low..=high).contains(&got) {
                     let wanted = if range.within.contains_key(&number.name) {
                         format!("expected {low} to {high}")
                     } else {
@@ -92,7 +96,7 @@ impl Function<'_> {
             .outputs
             .iter()
             .zip(&limits)
-            .map(|(number, [least, greatest])| format!("{} {least:.6} to {greatest:.6}", number.name))
+            .map(|(output, [least, greatest])| format!("{} {} to {}", output.name, number(*least), number(*greatest)))
             .collect();
         let summary = format!("{} inputs; {}", lanes.len(), found.join(", "));
         let numbers = json!({ "inputs": lanes.len() });
@@ -111,9 +115,9 @@ impl Function<'_> {
         let tests: Vec<_> = mean.expect.iter().map(test).collect();
         let text = |(name, expected, got, p): &(String, f64, Summary, f64)| {
             let Summary { mean, standard_error } = got;
-            format!("{name} {mean:.6} ± {standard_error:.1e}, expected {expected}, {}", p_text(*p))
+            format!("{name} {mean:.6} ± {}, expected {expected}, {}", error_text(*standard_error), p_text(*p))
         };
-        let failures = tests.iter().filter(|(.., p)| !(*p >= level.each)).map(text).collect();
+        let failures = tests.iter().filter(|(.., p)| !within(level.each, *p)).map(text).collect();
         let lowest = &tests[worst(tests.iter().map(|(.., p)| *p))];
         let summary = format!("{} samples; {}; {}", mean.samples, text(lowest), level.told(tests.len()));
         let (name_of, expected, got, p) = lowest;

@@ -68,11 +68,15 @@ fn measure_group(
     };
     let bins: Vec<Bins> = pilot.chunks_exact(PILOT as usize).map(|s| Bins::new(&directions(s))).collect();
     let owner: Vec<usize> = bins.iter().enumerate().flat_map(|(i, bins)| bins.cells.iter().map(move |_| i)).collect();
-    let cells: Vec<Cell> = bins.iter().flat_map(|bins| bins.cells.clone()).collect();
+    let (mut pieces, mut first) = (Vec::new(), 0);
+    for bins in &bins {
+        pieces.extend(bins.pieces.iter().map(|(bin, cell)| (first + bin, *cell)));
+        first += bins.cells.len();
+    }
 
     let mut faults: Vec<Option<String>> = vec![None; configurations.len()];
-    let integrals = integrate(&cells, TOLERANCE, |at| -> Result<Vec<[f64; 4]>> {
-        // Cells stay in the order of their configurations.
+    let integrals = integrate(owner.len(), &pieces, TOLERANCE, |at| -> Result<Vec<[f64; 4]>> {
+        // Pieces stay in the order of their configurations.
         let owned: Vec<_> = at.iter().map(|(bin, wi)| (owner[*bin], *wi)).collect();
         let values = kernel.evaluate(configurations, &owned, false)?;
         for ((owner, wi), value) in owned.iter().zip(&values) {

@@ -85,23 +85,24 @@ struct Pending<const N: usize> {
     coarse: [f64; N],
 }
 
-/// Integrates `N` functions of direction over each bin, per solid angle. `evaluate` gets (bin, direction) and returns the
-/// values there; a cell is cut in four until that changes its integrals by less than `tolerance`.
+/// Integrates `N` functions of direction over each of `bins` bins, per solid angle. `cells` are what the bins are made of,
+/// each with the index of its bin. `evaluate` gets (bin, direction), in the order of `cells`, and returns the values there; a
+/// cell is cut in four until that changes its integrals by less than `tolerance`.
 ///
 /// # Errors
 /// Those of `evaluate`.
 pub fn integrate<const N: usize, E>(
-    bins: &[Cell],
+    bins: usize,
+    cells: &[(usize, Cell)],
     tolerance: f64,
     mut evaluate: impl FnMut(&[(usize, DVec3)]) -> Result<Vec<[f64; N]>, E>,
 ) -> Result<Vec<Integral<N>>, E> {
     let rule = gauss_legendre(ORDER);
-    let mut results = vec![Integral { value: [0.0; N], error: [0.0; N] }; bins.len()];
-    let whole: Vec<(usize, Cell)> = bins.iter().copied().enumerate().collect();
-    let coarse = integrate_cells(&whole, &rule, &mut evaluate)?;
-    let pending = |((bin, cell), coarse)| Pending { bin, depth: 0, cell, coarse };
-    let mut waiting: Vec<Pending<N>> = whole.into_iter().zip(coarse).map(pending).collect();
-    let mut nodes_left = MOST_NODES_A_BIN * bins.len();
+    let mut results = vec![Integral { value: [0.0; N], error: [0.0; N] }; bins];
+    let coarse = integrate_cells(cells, &rule, &mut evaluate)?;
+    let pending = |(&(bin, cell), coarse): (&(usize, Cell), _)| Pending { bin, depth: 0, cell, coarse };
+    let mut waiting: Vec<Pending<N>> = cells.iter().zip(coarse).map(pending).collect();
+    let mut nodes_left = MOST_NODES_A_BIN * bins;
     while !waiting.is_empty() {
         let quarters: Vec<(usize, Cell)> =
             waiting.iter().flat_map(|p| p.cell.quarters().map(|cell| (p.bin, cell))).collect();
@@ -191,7 +192,7 @@ mod tests {
 
     fn over<const N: usize>(bins: &[Cell], f: impl Fn(DVec3) -> [f64; N]) -> Vec<Integral<N>> {
         let evaluate = |at: &[(usize, DVec3)]| Ok::<_, ()>(at.iter().map(|(_, w)| f(*w)).collect());
-        integrate(bins, 1e-9, evaluate).unwrap()
+        integrate(bins.len(), &bins.iter().copied().enumerate().collect::<Vec<_>>(), 1e-9, evaluate).unwrap()
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What came of the checks.
 
+use glam::DVec3;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -95,7 +96,32 @@ pub(super) fn p_of_excess(deviation: f64, tolerance: f64, standard_error: f64) -
 
 /// A p-value as text.
 pub(super) fn p_text(p: f64) -> String {
-    if p >= 1e-3 { format!("p = {p:.3}") } else { format!("p = {p:.1e}") }
+    if p >= 1e-3 { format!("p = {p:.3}") } else { format!("p = {}", number(p)) }
+}
+
+/// Whether an error is allowed; NaN is not.
+pub(super) fn within(error: f64, allowed: f64) -> bool {
+    error <= allowed
+}
+
+/// A number as text, with six significant digits at most.
+pub(super) fn number(x: f64) -> String {
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    if !rounded.is_finite() || rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+/// An error as text, with two significant digits.
+pub(super) fn error_text(x: f64) -> String {
+    if x == 0.0 { String::from("0") } else { format!("{x:.1e}") }
+}
+
+/// A vector as text.
+pub(super) fn vector(v: DVec3) -> String {
+    format!("({}, {}, {})", number(v.x), number(v.y), number(v.z))
 }
 
 /// The index of the smallest; NaN counts as the smallest of all.
@@ -116,6 +142,12 @@ mod tests {
         // 1.96 standard errors.
         assert!((p_of_excess(-1.96e-3 - 1e-3, 1e-3, 1e-3) - 0.05).abs() < 1e-4);
         assert_eq!(worst([0.3, f64::NAN, 0.1].into_iter()), 1);
+        for (x, text) in
+            [(0.1_f32.into(), "0.1"), (-2.0, "-2"), (1e-6, "1e-6"), (1.0 / 3.0, "0.333333"), (1e20, "1e20")]
+        {
+            assert_eq!(number(x), text);
+        }
+        assert_eq!((number(0.0).as_str(), number(f64::NAN).as_str(), p_text(0.0).as_str()), ("0", "NaN", "p = 0"));
         let level = Level::new(0.01, 10);
         assert!((1.0 - (1.0 - level.each).powi(10) - 0.01).abs() < 1e-12);
     }
