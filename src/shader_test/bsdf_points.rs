@@ -8,7 +8,7 @@ use serde_json::json;
 use super::bsdf_kernel::{BsdfKernel, Sample};
 use super::bsdf_statistics::fixed_directions;
 use super::configuration::Configuration;
-use super::report::{CheckReport, number, vector, within};
+use super::report::{CheckReport, error_text, number, vector, within};
 use crate::Result;
 
 /// Samples of a configuration.
@@ -47,7 +47,7 @@ pub(super) fn weights(
             }
         }
     }
-    let summary = format!("{tested} samples; largest relative error {worst}; {relative} allowed");
+    let summary = format!("{tested} samples; largest relative error {worst}; {} allowed", number(relative));
     let numbers = json!({
         "configurations": configurations.len(), "samples": tested, "largest_error": worst.error, "allowed": relative,
         "at": worst.label,
@@ -98,7 +98,7 @@ pub(super) fn reciprocity(
             failures.add(&c.label, &format!("f(wo, wi) is {f}, f(wi, wo) {reverse}, for wo {wo} and wi {wi}"));
         }
     }
-    let summary = format!("{} pairs; largest relative difference {worst}; {relative} allowed", at.len());
+    let summary = format!("{} pairs; largest relative difference {worst}; {} allowed", at.len(), number(relative));
     let numbers = json!({
         "configurations": configurations.len(), "pairs": at.len(), "largest_error": worst.error, "allowed": relative,
         "at": worst.label,
@@ -207,6 +207,7 @@ impl Worst {
 
 impl std::fmt::Display for Worst {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} at {}", number(self.error), self.label)
+        let told = if self.error < 0.01 { error_text(self.error) } else { number(self.error) };
+        write!(f, "{told} at {}", self.label)
     }
 }

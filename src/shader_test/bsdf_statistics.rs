@@ -204,7 +204,7 @@ impl Channel {
             let p = p_of_excess(value - self.samples, self.tolerance, self.standard_error);
             if p < threshold {
                 let told = self.told();
-                return Some(format!("weights and f are of two models: {told}, {} that they agree", p_text(p)));
+                return Some(format!("the samples and f are of two models: {told}, {} that they agree", p_text(p)));
             }
             let over = if self.exact { (value - self.expected).abs() } else { value - self.expected };
             if !within(over, self.tolerance) {

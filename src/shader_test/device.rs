@@ -1,5 +1,7 @@
 //! The device that kernels are tested on, with a scene bound that does not matter.
 
+use std::path::Path;
+
 use glam::DAffine3;
 
 use crate::gpu::shader_compiler::Sources;
@@ -48,11 +50,11 @@ impl TestDevice {
         &self.open.gpu.info
     }
 
-    /// Compiles a kernel.
+    /// Compiles a kernel, which messages name by `told`.
     ///
     /// # Errors
     /// [`Error::Input`] with the compiler's messages, each with file, line, column and the line itself; errors of the device.
-    pub(super) fn kernel(&self, sources: &Sources, file: &str) -> Result<FunctionKernel> {
+    pub(super) fn kernel(&self, sources: &Sources, file: &str, told: &Path) -> Result<FunctionKernel> {
         let by_bvh = self.prepared.features.light_choice == LightChoice::Bvh;
         let call = FunctionCall {
             sources,
@@ -68,7 +70,7 @@ impl TestDevice {
         kernel.map_err(|error| match error {
             GpuError::Shader(error) => {
                 let messages: Vec<_> = diagnose(&error, sources).iter().map(ToString::to_string).collect();
-                Error::input(file.as_ref(), format!("does not compile:\n{}", messages.join("\n")))
+                Error::input(told, format!("does not compile:\n{}", messages.join("\n")))
             }
             other => other.into(),
         })

@@ -60,11 +60,11 @@ impl Function<'_> {
         let (absolute, relative) = (values.absolute, values.relative);
         let allowed = match (absolute, relative) {
             (0.0, 0.0) => String::from("none"),
-            (absolute, 0.0) => format!("{absolute}"),
-            (0.0, relative) => format!("{relative} of the value"),
-            (absolute, relative) => format!("{absolute} + {relative} of the value"),
+            (absolute, 0.0) => number(absolute),
+            (0.0, relative) => format!("{} of the value", number(relative)),
+            (absolute, relative) => format!("{} + {} of the value", number(absolute), number(relative)),
         };
-        let summary = format!("{} rows; largest error {}; {allowed} allowed", values.rows.len(), number(largest));
+        let summary = format!("{} rows; largest error {}; {allowed} allowed", values.rows.len(), error_text(largest));
         let numbers = json!({
             "rows": values.rows.len(), "largest_error": largest, "absolute": absolute, "relative": relative,
         });

@@ -36,6 +36,8 @@ pub use function_expectations::{
 };
 pub use report::{CheckReport, FileReport};
 
+use std::path::Path;
+
 use crate::{Error, Result};
 use bsdf_kernel::BsdfKernel;
 use expectations::Kind;
@@ -49,7 +51,9 @@ use targets::Target;
 /// A kernel that does not compile ([`Error::Input`]), and errors of the device. What is not as expected is no error, but
 /// part of the report.
 pub fn run(device: &TestDevice, target: &Target, seed: u32) -> Result<FileReport> {
-    let kernel = device.kernel(&target.sources, &target.kernel)?;
+    let kernel_name = target.kernel.rsplit('/').next().unwrap_or_default();
+    let told = Path::new(&target.file).with_file_name(kernel_name);
+    let kernel = device.kernel(&target.sources, &target.kernel, &told)?;
     let significance = target.expectations.significance;
     let checks = match &target.expectations.kind {
         Kind::Function(expectations) => {
