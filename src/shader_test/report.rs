@@ -96,7 +96,7 @@ pub(super) fn p_of_excess(deviation: f64, tolerance: f64, standard_error: f64) -
 
 /// A p-value as text.
 pub(super) fn p_text(p: f64) -> String {
-    if p >= 1e-3 { format!("p = {p:.3}") } else { format!("p = {}", number(p)) }
+    if p >= 1e-3 { format!("p = {p:.3}") } else { format!("p = {}", error_text(p)) }
 }
 
 /// Whether an error is allowed; NaN is not.

@@ -113,6 +113,31 @@ fn chi2_notices_a_missing_sector() {
     assert_fails(&faults, "chi2 ", &["worst bin"]);
 }
 
+/// A GGX lobe whose sampled α is 4 % off, from 0.004 to 0.5, also at grazing angles: of each roughness at some angle.
+#[test]
+fn chi2_notices_a_roughness_that_is_off() {
+    const FILE: &str = "test/bsdf_metallic_roughness.toml";
+    let mut sources = gpu::sources().clone();
+    let kernel = FILE.replace(".toml", ".comp");
+    let sampled = "return bsdf_scatter(parameters(configuration, wo), wo, u);";
+    let off =
+        "BsdfParameters p = parameters(configuration, wo);\n    p.alpha *= 1.04;\n    return bsdf_scatter(p, wo, u);";
+    assert!(sources[&kernel].contains(sampled));
+    let text = sources[&kernel].replace(sampled, off);
+    sources.insert(kernel, text);
+    for roughness in [0.06, 0.3, 0.7] {
+        let text = format!(
+            "parameters = ['color', 'metallic', 'roughness', 'ior', 'transmission', 'solid']\n\
+             grid = {{ color = 0.8, metallic = 1, roughness = {roughness}, ior = 1.5, transmission = 0, solid = 0, \
+             cosine = [1, 0.6, 0.1] }}\n[[test]]\ncheck = 'chi2'\n"
+        );
+        sources.insert(FILE.to_owned(), text);
+        let report = test(sources.clone(), FILE, 0);
+        println!("roughness {roughness}: {}", report.checks[0].summary);
+        assert!(!report.passed, "{:?}", report.checks[0]);
+    }
+}
+
 /// A density 2 % too large.
 #[test]
 fn integral_notices_a_wrong_normalisation() {
