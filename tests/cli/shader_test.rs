@@ -146,3 +146,17 @@ fn a_new_lobe_is_written_once_and_only_where_it_belongs() {
     passes(path, &["shader-test", "bsdf_velvet", "--shaders", "mine"], &["mine/test/bsdf_velvet.toml: velvet: a lobe"]);
     passes(path, &["shaders", "check", "mine"], &["kernels compile"]);
 }
+
+/// The example of the chapter on shader tests.
+#[test]
+fn the_example_of_the_chapter_works() {
+    let chapter = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/shader-tests.md")).unwrap();
+    let block = |language: &str| {
+        let (_, rest) = chapter.split_once(&format!("```{language}\n")).expect("the block is there");
+        rest.split_once("```").expect("the block ends").0.to_owned()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("example.comp"), block("glsl")).unwrap();
+    std::fs::write(folder.path().join("example.toml"), block("toml")).unwrap();
+    passes(folder.path(), &["shader-test", "example.comp"], &["ok    values: 2 rows", "ok    range: 303 inputs"]);
+}
