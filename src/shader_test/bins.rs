@@ -12,11 +12,8 @@ const LEAST_CUTS: u32 = 4;
 /// The most, which makes 256 bins of a hemisphere.
 const MOST_CUTS: u32 = 8;
 
-/// From so few samples nothing is concluded about their density.
-const FEW: usize = 16;
-/// Where a half of a cell holds this share of its samples, the density in it is too uneven for a quadrature. Of 64 samples
-/// of an even density a half holds so many by chance in one cell of a thousand.
-const UNEVEN: f64 = 0.7;
+/// Fewer samples close together are nothing to go by.
+const FEWEST: usize = 6;
 /// A piece is cut in two this many times, at most.
 const MOST_HALVINGS: u32 = 48;
 
@@ -79,19 +76,10 @@ impl Bins {
     }
 
     /// A narrow lobe in a wide bin lies between the nodes of a quadrature, which then knows nothing of it. Halving the cell
-    /// wherever most samples are in one half makes pieces whose size is in proportion to their distance from the lobe.
+    /// wherever samples are close together makes pieces whose size is in proportion to their distance from the lobe.
     fn cut_where_dense(&mut self, cell: Cell, points: &mut [[f64; 2]], halvings: u32) {
-        let uneven = |axis: usize, range: [f64; 2]| {
-            let share = |low: f64, high: f64| {
-                let width = range[1] - range[0];
-                let (low, high) = (range[0] + low * width, range[0] + high * width);
-                points.iter().filter(|point| low <= point[axis] && point[axis] < high).count() as f64
-                    / points.len() as f64
-            };
-            share(0.0, 0.5).max(share(0.25, 0.75)).max(share(0.5, 1.0))
-        };
-        let [radius, turns] = [uneven(0, cell.radius), uneven(1, cell.turns)];
-        if points.len() < FEW || halvings >= MOST_HALVINGS || radius.max(turns) < UNEVEN {
+        let [radius, turns] = [crowding(points, 0, cell.radius), crowding(points, 1, cell.turns)];
+        if radius.max(turns) <= 1.0 || halvings >= MOST_HALVINGS {
             self.pieces.push((self.cells.len(), cell));
             return;
         }
@@ -121,6 +109,21 @@ impl Bins {
     }
 }
 
+/// How crowded the most crowded stretch of the range is: its samples over those of an even density, or 1 if that may be
+/// chance. Of λ expected samples in a stretch, λ + 4.5·√λ + 3 are found in some hundred stretches in one cell of a thousand.
+fn crowding(points: &[[f64; 2]], axis: usize, range: [f64; 2]) -> f64 {
+    let mut along: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+    along.sort_by(f64::total_cmp);
+    let density = along.len() as f64 / (range[1] - range[0]);
+    let sizes = std::iter::successors(Some(FEWEST), |size| Some(2 * size)).take_while(|size| *size <= along.len());
+    let crowded = |size: usize| {
+        let shortest = along.windows(size).map(|w| w[size - 1] - w[0]).fold(f64::INFINITY, f64::min);
+        let expected = shortest * density;
+        if expected + 4.5 * expected.sqrt() + 3.0 < size as f64 { size as f64 / expected.max(1e-9) } else { 1.0 }
+    };
+    sizes.map(crowded).fold(1.0, f64::max)
+}
+
 /// Half of the points are below it along the axis.
 fn median(points: &mut [[f64; 2]], axis: usize) -> Option<f64> {
     let middle = points.len() / 2;
@@ -131,6 +134,7 @@ fn median(points: &mut [[f64; 2]], axis: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shader_test::quadrature::integrate;
 
     /// Points of a plane lattice, made directions of a cosine lobe.
     fn directions(n: u32) -> Vec<DVec3> {
@@ -156,6 +160,36 @@ mod tests {
         let area: f64 =
             bins.cells.iter().map(|c| (c.radius[1].powi(2) - c.radius[0].powi(2)) * (c.turns[1] - c.turns[0])).sum();
         assert!((area - 2.0).abs() < 1e-12, "{area}");
+    }
+
+    /// Half of the samples are in a lobe of a thousandth of a radian, the others are by the cosine: over the pieces, both are
+    /// integrated in full.
+    #[test]
+    fn a_narrow_lobe_over_a_broad_one_is_integrated_in_full() {
+        const CONCENTRATION: f64 = 1e6;
+        let (axis, side, up) = (DVec3::new(0.6, 0.8, 0.0), DVec3::Z, DVec3::new(-0.8, 0.6, 0.0));
+        let narrow = |i: u32| {
+            let (u, v) = ((f64::from(i) + 0.5) / f64::from(1 << 16), (f64::from(i) * 0.618_033_988_75).fract());
+            let radius = (-2.0 * (1.0 - u).ln() / CONCENTRATION).sqrt();
+            let (sin, cos) = (v * std::f64::consts::TAU).sin_cos();
+            (axis + (side * cos + up * sin) * radius).normalize()
+        };
+        let samples: Vec<DVec3> =
+            directions(1 << 16).into_iter().zip(0..).map(|(w, i)| if i % 2 == 0 { narrow(i) } else { w }).collect();
+        let bins = Bins::new(&samples);
+        // von Mises and Fisher's density and the cosine's.
+        let density = |w: DVec3| {
+            let lobe =
+                (-0.5 * CONCENTRATION * (w - axis).length_squared()).exp() * CONCENTRATION / std::f64::consts::TAU;
+            [0.5 * lobe, 0.5 * w.y.max(0.0) * std::f64::consts::FRAC_1_PI]
+        };
+        let evaluate = |at: &[(usize, DVec3)]| Ok::<_, ()>(at.iter().map(|(_, w)| density(*w)).collect());
+        let integrals = integrate(bins.cells.len(), &bins.pieces, 1e-6, evaluate).unwrap();
+        for k in 0..2 {
+            let sum: f64 = integrals.iter().map(|integral| integral.value[k]).sum();
+            // Ten of the samples.
+            assert!((sum - 0.5).abs() < 10.0 / f64::from(1 << 16), "part {k}: {sum}");
+        }
     }
 
     #[test]

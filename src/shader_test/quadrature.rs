@@ -207,17 +207,6 @@ mod tests {
     }
 
     #[test]
-    fn a_lobe_of_a_thousandth_of_a_radian_is_found_from_a_bin_around_it() {
-        // von Mises and Fisher's density about a tilted axis, with concentration 10⁶.
-        let axis = DVec3::new(0.6, 0.8, 0.0);
-        let density = |w: DVec3| [1e6 / TAU * (-0.5e6 * (w - axis).length_squared()).exp()];
-        let [_, near] = Cell::hemisphere(false).cut(true, 0.4);
-        let [near, _] = near.cut(true, 0.5);
-        let integral = &over(&[near], density)[0];
-        assert!((integral.value[0] - 1.0).abs() < 1e-6, "{integral:?}");
-    }
-
-    #[test]
     fn directions_and_coordinates_are_inverse_down_to_the_pole() {
         for (below, radius, turns) in [(false, 1e-5, 0.3), (true, 0.7, 0.99), (false, 1.0, 0.0)] {
             // As a shader would give it.
