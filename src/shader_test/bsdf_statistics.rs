@@ -136,7 +136,10 @@ pub(super) fn furnace(
     }
     let flat: Vec<(usize, &Channel)> =
         channels.iter().enumerate().flat_map(|(i, c)| c.iter().map(move |c| (i, c))).collect();
-    let (index, channel) = flat[worst(flat.iter().map(|(_, channel)| -channel.excess()))];
+    let wrong = flat.iter().filter(|(_, channel)| channel.wrong(level.each).is_some());
+    let most_wrong = wrong.max_by(|(_, a), (_, b)| a.offence().total_cmp(&b.offence()));
+    let furthest = || flat[worst(flat.iter().map(|(_, channel)| -channel.excess()))];
+    let (index, channel) = most_wrong.copied().unwrap_or_else(furthest);
     let expected = if exact {
         format!("{} ± {tolerance}", number(channel.expected))
     } else {
@@ -179,6 +182,12 @@ impl Channel {
     fn excess(&self) -> f64 {
         let over = |got: f64| if self.exact { (got - self.expected).abs() } else { got - self.expected };
         self.integral.map_or(over(self.samples), |(value, _)| over(value).max(over(self.samples)))
+    }
+
+    /// By how much it is off, where something is wrong with it: the two ways to measure count too.
+    fn offence(&self) -> f64 {
+        let apart = self.integral.map_or(0.0, |(value, _)| (value - self.samples).abs());
+        self.excess().max(apart)
     }
 
     fn p(&self) -> f64 {
