@@ -43,7 +43,7 @@ pub enum Error {
     /// The device was lost during the work or ran out of memory.
     #[error("{0}")]
     DeviceLost(String),
-    /// A result exists and must not be trusted (`--strict`).
+    /// A result exists and must not be trusted (`--strict`), or a shader test's expectations are not met.
     #[error("{0}")]
     Untrustworthy(String),
     /// Stopped from outside, after what was there had been written.

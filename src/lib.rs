@@ -11,6 +11,7 @@
 //! | [`render`] | what is asked for, the kernel for it, slices on a device, and the result |
 //! | [`film`] | sums of samples in f64; EXR and PNG, merging, error metrics; knows neither the GPU nor scenes |
 //! | [`mod@bench`] | run time against error: repeated renders, their errors to a reference, slopes, verdicts, plots |
+//! | [`shader_test`] | a single shader function against what is expected of it |
 //! | [`watch`] | the shader loop: a worker process that renders, files that change, the page that shows it |
 //! | [`error`] | what can end a run, and the exit code each kind has |
 //!
@@ -44,6 +45,7 @@ mod named_enum;
 pub mod prepare;
 pub mod render;
 pub mod scene;
+pub mod shader_test;
 pub mod watch;
 
 pub use error::{Error, Result};

@@ -19,6 +19,7 @@ mod progress;
 mod render;
 mod render_args;
 mod render_report;
+mod shader_test;
 mod shaders;
 mod statistics_report;
 mod tone_args;
@@ -38,7 +39,7 @@ Exit codes:
   3    the scene or another input is bad, or an output cannot be written
   4    no usable device, or the device lacks what was demanded
   5    the device was lost or is out of memory
-  6    the result is not trustworthy (--strict)
+  6    the result is not trustworthy (--strict), or a shader test's expectations are not met
   130  interrupted, after the partial image was written";
 
 /// Sunfleck: a headless, physically based path tracer on Vulkan, with and without ray-tracing hardware.
@@ -59,6 +60,7 @@ enum Command {
     Bench(Box<bench::BenchArgs>),
     Watch(Box<watch::WatchArgs>),
     Shaders(shaders::ShadersArgs),
+    ShaderTest(shader_test::ShaderTestArgs),
     /// Renders for `watch`, which speaks to it over standard input and output.
     #[command(hide = true)]
     WatchWorker(Box<watch::WorkerArgs>),
@@ -93,6 +95,7 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Bench(args) => bench::run(*args),
         Command::Watch(args) => watch::run(&args),
         Command::Shaders(args) => Ok(shaders::run(&args)?),
+        Command::ShaderTest(args) => shader_test::run(args),
         Command::WatchWorker(args) => watch::run_worker(&args),
     }
 }

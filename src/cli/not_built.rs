@@ -18,7 +18,7 @@ const NOT_BUILT: &[Entry] = &[
     ("--filter tent", |c| render(c, |r| r.filter == PixelFilter::Tent)),
     ("--filter gaussian", |c| render(c, |r| r.filter == PixelFilter::Gaussian)),
     ("--filter blackman-harris", |c| render(c, |r| r.filter == PixelFilter::BlackmanHarris)),
-    ("--device all", |c| estimator(c, |e| e.device == DeviceChoice::All)),
+    ("--device all", |c| estimator(c, |e| e.device == DeviceChoice::All) || shader_test(c)),
 ];
 
 fn render(command: &Command, uses: fn(&RenderArgs) -> bool) -> bool {
@@ -32,6 +32,10 @@ fn estimator(command: &Command, uses: fn(&EstimatorArgs) -> bool) -> bool {
         Command::Watch(args) => uses(&args.job.estimator),
         _ => false,
     }
+}
+
+fn shader_test(command: &Command) -> bool {
+    matches!(command, Command::ShaderTest(args) if args.device == DeviceChoice::All)
 }
 
 /// A usage error that names what is asked for and not built; never is it ignored.

@@ -89,7 +89,7 @@ fn join(folder: &str, relative: &str) -> String {
     parts.join("/")
 }
 
-/// Reads every shader source below `folder`.
+/// Reads every shader source below `folder`, and the expectations (`.toml`) beside kernels for tests.
 ///
 /// # Errors
 /// When the folder or a file in it cannot be read.
@@ -106,7 +106,7 @@ fn read_folder(folder: &std::path::Path, prefix: &str, sources: &mut Sources) ->
         let path = format!("{prefix}{name}");
         if entry.file_type()?.is_dir() {
             read_folder(&entry.path(), &format!("{path}/"), sources)?;
-        } else if name.ends_with(".comp") || name.ends_with(".glsl") {
+        } else if [".comp", ".glsl", ".toml"].iter().any(|ending| name.ends_with(ending)) {
             sources.insert(path, std::fs::read_to_string(entry.path())?);
         }
     }

@@ -21,7 +21,7 @@ use std::time::Instant;
 
 pub use bake::{Bake, BakeReport, Baked, MOST_BAKED_RECORDS, MOST_BAKED_TRIANGLES};
 pub use calibrate::calibrate;
-pub use function_kernel::FunctionCall;
+pub use function_kernel::{FunctionCall, FunctionKernel};
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};
 pub use path_tracer::{BindingOverride, PathTracer};

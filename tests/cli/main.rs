@@ -4,6 +4,8 @@ mod aov;
 mod bench;
 mod devices;
 mod driver_environment;
+mod guide;
 mod images;
+mod shader_test;
 mod usage;
 mod watch;

@@ -115,8 +115,14 @@ fn help_names_everything_of_the_contract_and_marks_what_is_not_built() {
     for flag in "--shaders --port --bind --no-serve --resolution --spp --hang --exposure".split_whitespace() {
         assert!(help.contains(flag), "{flag}");
     }
+    let (_, help, _) = run_in(here, &["shader-test", "--help"]);
+    for flag in "[FILE]... --shaders --device --seed --json".split_whitespace() {
+        assert!(help.contains(flag), "{flag}");
+    }
     let (_, help, _) = run_in(here, &["--help"]);
-    for command in ["render", "devices", "info", "compare", "merge", "bench", "watch", "shaders", "Exit codes"] {
+    for command in
+        ["render", "devices", "info", "compare", "merge", "bench", "watch", "shaders", "shader-test", "Exit codes"]
+    {
         assert!(help.contains(command), "{command}");
     }
     let (code, version, _) = run_in(here, &["--version"]);

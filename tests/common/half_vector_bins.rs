@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use glam::DVec3;
+pub use sunfleck::shader_test::quadrature::gauss_legendre;
 
 /// Bins of directions that resolve a lobe however narrow: rings of the half vector's polar angle around the normal, cut
 /// into sectors of its azimuth counted from wo's. Where the roughness along x and z differs, the half vector is scaled
@@ -173,27 +174,4 @@ impl HalfVectorBins {
         let weight = 4.0 * cosine * polar.sin() * weight / length.powi(3);
         (wi.y > 0.0).then_some(Node { bin, wi, weight })
     }
-}
-
-/// Nodes and weights on [0, 1], by Newton's steps on the Legendre polynomial.
-pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
-    let node = |i: usize| {
-        let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
-        let mut slope = 0.0;
-        for _ in 0..50 {
-            let (mut p0, mut p1) = (1.0, x);
-            for k in 2..=n {
-                let k = k as f64;
-                (p0, p1) = (p1, ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k);
-            }
-            slope = n as f64 * (x * p1 - p0) / (x * x - 1.0);
-            let step = p1 / slope;
-            x -= step;
-            if step.abs() < 1e-16 {
-                break;
-            }
-        }
-        (0.5 + 0.5 * x, 1.0 / ((1.0 - x * x) * slope * slope))
-    };
-    (0..n).map(node).collect()
 }

@@ -1,5 +1,10 @@
 //! What the integration tests share.
-#![allow(dead_code, unreachable_pub, reason = "every test binary compiles this module and uses a part of it")]
+#![allow(
+    dead_code,
+    unreachable_pub,
+    unused_imports,
+    reason = "every test binary compiles this module and uses a part of it"
+)]
 
 pub mod assets;
 pub mod brute_force;

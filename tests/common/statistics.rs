@@ -10,13 +10,11 @@ use std::f64::consts::{PI, SQRT_2};
 use std::fmt;
 
 pub use sunfleck::bench::statistics::sidak;
+pub use sunfleck::shader_test::chi_square::{ChiSquare, chi_square_test};
 
 /// Rounding of radiance that is summed and stored in 32-bit floats, relative to the value. Keeps two constant tiles (a
 /// lamp that fills the tile) equal although their variance is zero.
 const ROUNDING: f64 = 1e-6;
-
-/// Below this expectation a cell is too small for the χ² approximation and is pooled (Cochran 1954).
-const SMALLEST_EXPECTATION: f64 = 5.0;
 
 /// ln Γ(x) for x > 0, by Lanczos' approximation (g = 7, 9 terms); relative error about 1e-15.
 pub fn ln_gamma(x: f64) -> f64 {
@@ -161,51 +159,6 @@ pub fn binomial_at_least(successes: u64, trials: u64, probability: f64) -> f64 {
         k if k > trials => 0.0,
         k => beta_regularised(probability, k as f64, (trials - k + 1) as f64),
     }
-}
-
-/// The outcome of a χ² goodness-of-fit test.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChiSquare {
-    /// Σ (observed − expected)² / expected over the cells after pooling.
-    pub statistic: f64,
-    /// Cells after pooling, less one.
-    pub degrees_of_freedom: usize,
-    /// The probability of a statistic at least as large, if the samples follow the expectation.
-    pub p_value: f64,
-}
-
-/// Pearson's χ² test of `observed` counts against `expected` counts (probability × `total`).
-///
-/// Of `total` samples those in no cell (a `scatter` that failed, say) make a cell of their own, with what the
-/// expectations leave. Expectations are not rescaled: a pdf that does not integrate to what it should is found. Cells
-/// with an expectation below 5 are pooled. Samples where nothing is expected give p = 0.
-pub fn chi_square_test(observed: &[u64], expected: &[f64], total: u64) -> ChiSquare {
-    assert_eq!(observed.len(), expected.len(), "a count and an expectation for every cell");
-    assert!(expected.iter().all(|e| e.is_finite() && *e >= 0.0), "an expectation is negative or not finite");
-    let counted: u64 = observed.iter().sum();
-    assert!(counted <= total, "{counted} samples in the cells, {total} in all");
-    let rest = (total as f64 - expected.iter().sum::<f64>()).max(0.0);
-
-    let mut cells: Vec<(f64, f64)> = observed.iter().map(|o| *o as f64).zip(expected.iter().copied()).collect();
-    cells.push(((total - counted) as f64, rest));
-    cells.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let large = cells.partition_point(|cell| cell.1 >= SMALLEST_EXPECTATION);
-    let pooled = cells.drain(large..).fold((0.0, 0.0), |sum, cell| (sum.0 + cell.0, sum.1 + cell.1));
-    if pooled.1 >= SMALLEST_EXPECTATION || cells.is_empty() {
-        cells.push(pooled);
-    } else if let Some(last) = cells.last_mut() {
-        // Samples in cells of no expectation must not hide in a large neighbour.
-        if pooled.1 == 0.0 && pooled.0 > 0.0 {
-            return ChiSquare { statistic: f64::INFINITY, degrees_of_freedom: large, p_value: 0.0 };
-        }
-        *last = (last.0 + pooled.0, last.1 + pooled.1);
-    }
-
-    let statistic = cells.iter().map(|(o, e)| if o == e { 0.0 } else { (o - e).powi(2) / e }).sum();
-    let degrees_of_freedom = cells.len() - 1;
-    let p_value =
-        if degrees_of_freedom == 0 { 1.0 } else { chi_square_upper_tail(statistic, degrees_of_freedom as f64) };
-    ChiSquare { statistic, degrees_of_freedom, p_value }
 }
 
 /// A mean estimated from independent repetitions (seeds).

@@ -31,6 +31,7 @@ mod plates;
 mod reciprocity;
 mod sampler;
 mod shader_math;
+mod shader_test;
 mod shaders_valid;
 mod shading_normals;
 mod sobol;

@@ -244,7 +244,8 @@ fn materials_and_their_extensions() {
              "KHR_materials_transmission": {"transmissionFactor": 0.75}}},
         {"extensions": {"KHR_materials_unlit": {}}, "emissiveFactor": [1, 1, 1]},
         {"extras": {"sunfleck": {"bsdf": "glass", "fresnel": "schlick", "black_back": true}}},
-        {"extras": {"sunfleck": {"bsdf": "lambertian"}, "of another program": 1}},
+        {"pbrMetallicRoughness": {"roughnessFactor": 0.5},
+         "extras": {"sunfleck": {"bsdf": "lambertian"}, "of another program": 1}},
         {"extras": {"sunfleck": {"bsdf": "mirror"}}},
         {"extras": {"sunfleck": {"bsdf": "refract"}}},
         {"name": "never used", "emissiveFactor": "nonsense"}
@@ -261,6 +262,8 @@ fn materials_and_their_extensions() {
     assert_eq!((first.emission, first.ior, first.transmission), ([12.0, 6.0, 0.0], 1.25, 0.75));
     assert!(first.double_sided && !scene.materials[1].is_emissive());
     assert!(scene.materials[2].fresnel == Fresnel::Schlick && scene.materials[2].black_back);
+    // For a lobe of the user's own in place of the Lambertian one.
+    assert_eq!(scene.materials[3].roughness, 0.5);
 }
 
 /// KHR_materials_volume makes a surface that transmits the boundary of a solid; without thickness it is a thin wall, and

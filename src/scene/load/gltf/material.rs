@@ -97,9 +97,12 @@ impl Loader<'_> {
         if material.base_color != [0.0; 3] || material.alpha_mode != AlphaMode::Opaque {
             material.base_color_texture = self.texture(pbr.get("baseColorTexture")?, has_texcoords)?;
         }
+        // Lambertian reflection has no roughness, but a lobe that somebody's own shaders put in its place has.
+        if matches!(material.bsdf, Bsdf::Lambertian | Bsdf::MetallicRoughness) {
+            material.roughness = pbr.number_in("roughnessFactor", 1.0, 0.0, 1.0)? as f32;
+        }
         if material.bsdf == Bsdf::MetallicRoughness {
             material.metallic = pbr.number_in("metallicFactor", 1.0, 0.0, 1.0)? as f32;
-            material.roughness = pbr.number_in("roughnessFactor", 1.0, 0.0, 1.0)? as f32;
             if material.metallic > 0.0 || material.roughness > 0.0 {
                 material.metallic_roughness_texture =
                     self.texture(pbr.get("metallicRoughnessTexture")?, has_texcoords)?;
