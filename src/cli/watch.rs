@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use sunfleck::render::{Settings, choose_camera};
-use sunfleck::watch::messages::View;
+use sunfleck::watch::messages::{Estimator, View};
 use sunfleck::watch::session::{self, Options, Serving};
 use sunfleck::watch::worker;
 use sunfleck::{Error, Result};
@@ -111,11 +111,11 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
     let options = Options {
         scene: args.job.scene.clone(),
         environment: environment.file,
-        shaders: settings.shaders_dir,
+        shaders: settings.shaders_dir.clone(),
         worker_arguments,
         view: View {
             camera,
-            integrator: settings.integrator.name().to_owned(),
+            estimator: Estimator::of(&settings),
             exposure: args.tone.exposure,
             tonemap: args.tone.tonemap.to_string(),
             ..View::default()
@@ -129,8 +129,9 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
 /// Renders for the server at the other end of standard input and output.
 pub(crate) fn run_worker(args: &WorkerArgs) -> anyhow::Result<()> {
     let (settings, environment) = args.settings()?;
-    let load = || load_scene(&args.scene, &environment, true).map_err(|error| format!("{error:#}"));
-    match worker::run(settings, &load) {
+    let scene = args.scene.clone();
+    let load = move || load_scene(&scene, &environment, true).map_err(|error| format!("{error:#}"));
+    match worker::run(settings, Box::new(load)) {
         // The server is gone.
         Err(Error::Interrupted) => Ok(()),
         result => Ok(result?),

@@ -3,6 +3,7 @@
 mod bake;
 mod calibrate;
 mod function_kernel;
+mod kernel_build;
 mod kernel_key;
 mod looks;
 mod open;
@@ -27,7 +28,7 @@ pub use path_tracer::{BindingOverride, PathTracer};
 pub use progress::ProgressUpdate;
 pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
 pub use run::{Run, RunPlan};
-pub use scene_buffers::choose_array_form;
+pub use scene_buffers::{SceneBuffers, choose_array_form};
 pub use settings::{
     DeviceChoice, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings, TraceChoice,
     choose_camera,

@@ -8,19 +8,17 @@ use std::time::{Duration, Instant};
 use ash::vk::BufferUsageFlags as Usage;
 use glam::DVec3;
 
-use super::bake::{Bake, BakeReport};
+use super::bake::BakeReport;
+use super::kernel_build::{baked_spirv, build_kernel, effective_max_bounces};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
-use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
+use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
-use super::{Integrator, ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
+use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
-use crate::gpu::{
-    ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
-    shader_compiler,
-};
-use crate::layout::{RenderConstants, SliceConstants};
+use crate::gpu::{ArrayForm, Buffer, Gpu, Kernel, MemoryUse, TraceBackend};
+use crate::layout::RenderConstants;
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
@@ -36,6 +34,8 @@ pub struct BindingOverride {
     pub slice_lanes: Option<u32>,
     /// Rays a lane may trace in one dispatch.
     pub ray_budget: Option<u32>,
+    /// Time a slice should take, where another than the usual is wanted.
+    pub slice_time: Option<Duration>,
     /// The driver puts in the specialisation constants, not [`crate::gpu::specialize`].
     pub driver_specializes: bool,
 }
@@ -47,7 +47,7 @@ pub struct PathTracer {
     constants: RenderConstants,
     constants_buffer: Buffer,
     slices: Vec<Slice>,
-    buffers: SceneBuffers,
+    buffers: Arc<SceneBuffers>,
     overrides: BindingOverride,
     bake: BakeReport,
     /// Seconds that compiling and uploading took.
@@ -75,7 +75,46 @@ impl PathTracer {
             Some(form) => form,
             None => choose_array_form(&gpu.info, &lengths)?,
         };
-        let buffers = SceneBuffers::upload(gpu, prepared, trace, form)?;
+        let buffers = Arc::new(SceneBuffers::upload(gpu, prepared, trace, form)?);
+        let mut tracer = Self::on_buffers(buffers, prepared, camera, settings, overrides)?;
+        tracer.upload_seconds = (start.elapsed().as_secs_f64() - tracer.compile_seconds).max(0.0);
+        Ok(tracer)
+    }
+
+    /// Another tracer of a scene that is on a device: on the same device its arrays are shared, on another they are uploaded
+    /// again.
+    ///
+    /// # Errors
+    /// Those of [`PathTracer::new`].
+    pub fn beside(
+        buffers: &Arc<SceneBuffers>,
+        gpu: &Arc<Gpu>,
+        prepared: &Prepared,
+        camera: &Camera,
+        settings: &Settings,
+        overrides: BindingOverride,
+    ) -> Result<Self> {
+        let buffers = if Arc::ptr_eq(gpu, &buffers.gpu) {
+            Arc::clone(buffers)
+        } else {
+            Arc::new(SceneBuffers::upload(gpu, prepared, buffers.trace, buffers.form)?)
+        };
+        Self::on_buffers(buffers, prepared, camera, settings, overrides)
+    }
+
+    /// The scene's arrays on the device.
+    pub fn buffers(&self) -> &Arc<SceneBuffers> {
+        &self.buffers
+    }
+
+    fn on_buffers(
+        buffers: Arc<SceneBuffers>,
+        prepared: &Prepared,
+        camera: &Camera,
+        settings: &Settings,
+        overrides: BindingOverride,
+    ) -> Result<Self> {
+        let gpu = &buffers.gpu;
         let mut constants = prepared.constants;
         camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
         constants.max_bounces = effective_max_bounces(settings);
@@ -90,9 +129,8 @@ impl PathTracer {
         let slice_lanes = overrides.slice_lanes.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
         let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes)).collect();
         let mut slices = slices?;
-        let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let mut key = KernelKey::new(prepared, camera, settings, trace, form);
+        let mut key = KernelKey::new(prepared, camera, settings, buffers.trace, buffers.form);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
@@ -107,7 +145,7 @@ impl PathTracer {
             overrides,
             bake,
             compile_seconds,
-            upload_seconds,
+            upload_seconds: 0.0,
         })
     }
 
@@ -126,10 +164,10 @@ impl PathTracer {
     ///
     /// # Errors
     /// A shader that does not compile, a lost device.
-    pub fn rebuild(&mut self, gpu: &Arc<Gpu>, prepared: &Prepared, camera: &Camera, settings: &Settings) -> Result<()> {
+    pub fn rebuild(&mut self, prepared: &Prepared, camera: &Camera, settings: &Settings) -> Result<()> {
         let start = Instant::now();
-        let form = (self.key.array_form, self.key.chunk_shift);
-        let mut key = KernelKey::new(prepared, camera, settings, self.key.trace, form);
+        let gpu = &self.buffers.gpu;
+        let mut key = self.key_for(prepared, camera, settings);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
         let kernel =
             build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &self.constants_buffer, &self.slices)?;
@@ -139,6 +177,11 @@ impl PathTracer {
         self.constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
         self.compile_seconds = start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// The key of the kernel that [`PathTracer::rebuild`] would build, but for what it would compile in.
+    pub fn key_for(&self, prepared: &Prepared, camera: &Camera, settings: &Settings) -> KernelKey {
+        KernelKey::new(prepared, camera, settings, self.buffers.trace, self.buffers.form)
     }
 
     /// Looks through another camera of the same kind (lens, projection), on a film of another size.
@@ -258,83 +301,4 @@ struct Limits {
     start: Instant,
     time: Option<Duration>,
     samples_total: Option<u64>,
-}
-
-/// An integrator that adds nothing behind the first scattering events need not look there.
-fn effective_max_bounces(settings: &Settings) -> u32 {
-    let needed = match settings.integrator {
-        Integrator::Emission => 0,
-        Integrator::Direct => 1,
-        Integrator::Path | Integrator::Indirect => u32::MAX,
-    };
-    settings.max_bounces.unwrap_or(u32::MAX).min(needed)
-}
-
-/// The kernel with what of the scene is to be compiled in; the key says so from then on.
-fn baked_spirv(
-    gpu: &Gpu,
-    prepared: &Prepared,
-    settings: &Settings,
-    overrides: BindingOverride,
-    key: &mut KernelKey,
-) -> Result<(Vec<u32>, BakeReport)> {
-    let bake = Bake::choose(prepared, gpu.info.kind, key.trace, settings.bake && !overrides.driver_specializes);
-    let (spirv, baked) = bake.apply(kernel_spirv(key, settings)?);
-    key.baked = baked;
-    Ok((spirv, bake.report(baked)))
-}
-
-fn build_kernel(
-    gpu: &Arc<Gpu>,
-    key: &KernelKey,
-    spirv: &[u32],
-    overrides: BindingOverride,
-    buffers: &SceneBuffers,
-    constants: &Buffer,
-    slices: &[Slice],
-) -> Result<Kernel> {
-    let arrays = buffers.bindings();
-    let array_binding = array_binding(buffers, key.array_form, &arrays);
-    let sets: Vec<Vec<BindingResource<'_>>> = slices
-        .iter()
-        .map(|slice| {
-            let mut set = vec![
-                BindingResource::Uniform(constants),
-                BindingResource::Storage(&slice.results),
-                BindingResource::Storage(&slice.lane_states),
-                array_binding,
-            ];
-            set.extend(buffers.acceleration.as_ref().map(BindingResource::AccelerationStructure));
-            set
-        })
-        .collect();
-    let sets: Vec<&[BindingResource<'_>]> = sets.iter().map(Vec::as_slice).collect();
-    let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
-    Ok(Kernel::new(
-        gpu,
-        &KernelDescription {
-            name: "path_trace",
-            spirv,
-            workgroup_size,
-            constants: &key.specialization(),
-            driver_specializes: overrides.driver_specializes,
-            push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
-            sets: &sets,
-        },
-    )?)
-}
-
-/// What the shader loop has compiled, else the embedded variant, or one compiled from `--shaders`.
-fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
-    if let Some(spirv) = &settings.kernel_spirv {
-        return Ok(spirv.to_vec());
-    }
-    let Some(folder) = &settings.shaders_dir else {
-        let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
-        return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
-    };
-    let sources = shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
-    let defines =
-        [("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
-    shader_compiler::compile(&sources, "path_trace.comp", &defines).map_err(|e| Error::input(folder, e.to_string()))
 }

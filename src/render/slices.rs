@@ -112,6 +112,7 @@ pub(super) struct SliceSizes {
     lanes: u32,
     largest: u32,
     ray_budget: u32,
+    target: Duration,
     fixed_lanes: bool,
     fixed_budget: bool,
 }
@@ -127,6 +128,7 @@ impl SliceSizes {
             lanes: overrides.slice_lanes.unwrap_or(FIRST_LANES).min(largest),
             largest,
             ray_budget: overrides.ray_budget.unwrap_or(1024),
+            target: overrides.slice_time.unwrap_or(TARGET),
             fixed_lanes: overrides.slice_lanes.is_some(),
             fixed_budget: overrides.ray_budget.is_some(),
         }
@@ -144,7 +146,7 @@ impl SliceSizes {
     pub(super) fn observe(&mut self, outcome: &SliceOutcome) {
         let own = outcome.seconds / SLICES_IN_FLIGHT as f64;
         if !self.fixed_lanes {
-            let factor = (TARGET.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
+            let factor = (self.target.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
             let wanted = f64::from(outcome.constants.lanes) * factor;
             self.lanes = (wanted as u32).clamp(FIRST_LANES.min(self.largest), self.largest);
         }

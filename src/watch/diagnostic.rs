@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::gpu::shader_compiler::{CompileError, Sources};
+use crate::gpu::shader_compiler::{CompileError, ErrorAtLine, Sources};
 use crate::watch::includes::{reached_from, trail};
 
 /// One message of the compiler.
@@ -38,42 +38,28 @@ impl std::fmt::Display for Diagnostic {
     }
 }
 
-/// The messages of a failed compilation; one at least.
+/// The errors of a failed compilation; one at least.
 pub fn diagnose(error: &CompileError, sources: &Sources) -> Vec<Diagnostic> {
     let reached = reached_from(sources, &error.file);
-    let mut found: Vec<_> = error.message.lines().filter_map(|line| parse(line, sources)).collect();
-    // glslang closes with a message that only repeats that there were errors.
-    found.retain(|d| !d.message.is_empty() && !d.message.starts_with("compilation terminated"));
-    if found.is_empty() {
-        found.push(Diagnostic {
-            file: error.file.clone(),
-            line: 0,
-            column: 0,
-            message: error.message.trim().to_owned(),
-            source: String::new(),
-            included_from: Vec::new(),
-        });
+    let at_line = |found: &ErrorAtLine| Diagnostic {
+        file: found.file.clone(),
+        line: found.line,
+        column: column_of(&found.message, &found.source),
+        message: found.message.clone(),
+        source: found.source.clone(),
+        included_from: trail(&reached, &found.file),
+    };
+    if !error.errors.is_empty() {
+        return error.errors.iter().map(at_line).collect();
     }
-    for diagnostic in &mut found {
-        diagnostic.included_from = trail(&reached, &diagnostic.file);
-    }
-    found
-}
-
-/// `FILE:LINE: error: MESSAGE`.
-fn parse(text: &str, sources: &Sources) -> Option<Diagnostic> {
-    let (place, message) = text.split_once(": error: ")?;
-    let (file, line) = place.rsplit_once(':')?;
-    let line: u32 = line.parse().ok()?;
-    let source = line.checked_sub(1).and_then(|i| sources.get(file)?.lines().nth(i as usize)).unwrap_or_default();
-    Some(Diagnostic {
-        file: file.to_owned(),
-        line,
-        column: column_of(message, source),
-        message: message.trim().to_owned(),
-        source: source.to_owned(),
+    vec![Diagnostic {
+        file: error.file.clone(),
+        line: 0,
+        column: 0,
+        message: error.message.trim().to_owned(),
+        source: String::new(),
         included_from: Vec::new(),
-    })
+    }]
 }
 
 /// glslang names no column, but quotes what it stumbled over.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::render::Settings;
+
 /// What is to be seen: the whole of it every time, so that a new worker needs no history.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -12,12 +14,57 @@ pub struct View {
     pub pose: Option<Pose>,
     /// The camera is being moved: fewer pixels, more images.
     pub moving: bool,
-    /// Name of a [`crate::render::Integrator`].
-    pub integrator: String,
+    /// What decides which code runs.
+    #[serde(flatten)]
+    pub estimator: Estimator,
     /// Exposure in steps: +1 doubles the brightness.
     pub exposure: f32,
     /// Name of a [`crate::film::tonemap::ToneMap`].
     pub tonemap: String,
+}
+
+/// The estimator that is shown: all but `max_bounces` are specialisation constants of the kernel.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Estimator {
+    /// Name of a [`crate::render::Integrator`].
+    pub integrator: String,
+    /// Name of a [`crate::render::LightSampling`].
+    pub light_sampling: String,
+    /// Name of a [`crate::render::MisHeuristic`].
+    pub mis: String,
+    /// Name of a [`crate::render::SamplerKind`].
+    pub sampler: String,
+    /// Scattering events a path may have; `None` is unlimited.
+    pub max_bounces: Option<u32>,
+}
+
+impl Estimator {
+    /// Of settings.
+    pub fn of(settings: &Settings) -> Self {
+        Self {
+            integrator: settings.integrator.name().to_owned(),
+            light_sampling: settings.light_sampling.name().to_owned(),
+            mis: settings.mis_heuristic.name().to_owned(),
+            sampler: settings.sampler.name().to_owned(),
+            max_bounces: settings.max_bounces,
+        }
+    }
+
+    /// Puts it into settings. A name that means nothing changes nothing.
+    pub fn apply(&self, settings: &mut Settings) {
+        Self::read(&mut settings.integrator, &self.integrator);
+        Self::read(&mut settings.light_sampling, &self.light_sampling);
+        Self::read(&mut settings.mis_heuristic, &self.mis);
+        Self::read(&mut settings.sampler, &self.sampler);
+        settings.max_bounces = self.max_bounces;
+    }
+
+    fn read<T: std::str::FromStr>(target: &mut T, name: &str) {
+        if let Ok(value) = name.parse() {
+            *target = value;
+        }
+    }
 }
 
 /// A camera by what it looks at. World space, metres.
@@ -41,6 +88,10 @@ pub enum ToWorker {
         /// Number of the edit that it comes from.
         edit: u32,
     },
+    /// An edit is about to be compiled: leave the processor to it, unless the picture moves or is not there yet.
+    Hold,
+    /// Nothing came of it.
+    Resume,
     /// Load the scene again.
     Scene {
         /// Number of the edit.
@@ -122,7 +173,12 @@ pub struct Frame {
 pub enum FromWorker {
     /// The scene is on the device.
     Ready(Ready),
-    /// The kernel of an edit is built.
+    /// The kernel of an edit is being built, while the old one goes on. It hangs if nothing follows.
+    Building {
+        /// Number of the edit.
+        edit: u32,
+    },
+    /// The kernel of an edit is built, and used from now on.
     Built {
         /// Number of the edit.
         edit: u32,
@@ -138,8 +194,7 @@ pub enum FromWorker {
     },
     /// An image.
     Frame(Frame),
-    /// What it does, each time that changes and while it renders: a worker that is busy with `build` or `render` and is not
-    /// heard of any more hangs.
+    /// What it does, each time that changes and while it renders: a worker that renders and is not heard of any more hangs.
     Stage(Stage),
     /// A pixel under the cursor.
     Pixel {
@@ -155,6 +210,8 @@ pub enum FromWorker {
         samples: u32,
         /// Variance of the mean luminance, from independent samples.
         variance: Option<f64>,
+        /// What is seen there.
+        seen: Option<Seen>,
     },
     /// An image file follows.
     Saved {
@@ -165,13 +222,32 @@ pub enum FromWorker {
     },
 }
 
+/// The nearest surface behind the middle of a pixel, through a pinhole and as if nothing were transparent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// Name of the material, or its number.
+    pub material: String,
+    /// Name of its BSDF.
+    pub bsdf: String,
+    /// Name of the mesh, or its number.
+    pub mesh: String,
+    /// Name of the instance (the node), or its number.
+    pub instance: String,
+    /// Number of the primitive in its mesh.
+    pub primitive: usize,
+    /// Number of the triangle in its primitive.
+    pub triangle: usize,
+    /// From the camera, in metres.
+    pub distance: f64,
+    /// Whether its back is seen.
+    pub is_back: bool,
+}
+
 /// What a worker is at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Stage {
     /// Reads and prepares the scene.
     Load,
-    /// Builds a kernel.
-    Build,
     /// Renders.
     Render,
     /// Waits for something to do.

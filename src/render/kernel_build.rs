@@ -1,0 +1,93 @@
+//! From a kernel's key to a kernel: the shader that fits, with what of the scene is compiled in.
+
+use std::sync::Arc;
+
+use super::bake::{Bake, BakeReport};
+use super::kernel_key::KernelKey;
+use super::path_tracer::BindingOverride;
+use super::scene_buffers::{SceneBuffers, array_binding};
+use super::slices::Slice;
+use super::{Integrator, Settings};
+use crate::gpu::{BindingResource, Buffer, Gpu, Kernel, KernelDescription, embedded, shader_compiler};
+use crate::layout::SliceConstants;
+use crate::prepare::Prepared;
+use crate::{Error, Result};
+
+/// An integrator that adds nothing behind the first scattering events need not look there.
+pub(super) fn effective_max_bounces(settings: &Settings) -> u32 {
+    let needed = match settings.integrator {
+        Integrator::Emission => 0,
+        Integrator::Direct => 1,
+        Integrator::Path | Integrator::Indirect => u32::MAX,
+    };
+    settings.max_bounces.unwrap_or(u32::MAX).min(needed)
+}
+
+/// The kernel with what of the scene is to be compiled in; the key says so from then on.
+pub(super) fn baked_spirv(
+    gpu: &Gpu,
+    prepared: &Prepared,
+    settings: &Settings,
+    overrides: BindingOverride,
+    key: &mut KernelKey,
+) -> Result<(Vec<u32>, BakeReport)> {
+    let bake = Bake::choose(prepared, gpu.info.kind, key.trace, settings.bake && !overrides.driver_specializes);
+    let (spirv, baked) = bake.apply(kernel_spirv(key, settings)?);
+    key.baked = baked;
+    Ok((spirv, bake.report(baked)))
+}
+
+pub(super) fn build_kernel(
+    gpu: &Arc<Gpu>,
+    key: &KernelKey,
+    spirv: &[u32],
+    overrides: BindingOverride,
+    buffers: &SceneBuffers,
+    constants: &Buffer,
+    slices: &[Slice],
+) -> Result<Kernel> {
+    let arrays = buffers.bindings();
+    let array_binding = array_binding(buffers, key.array_form, &arrays);
+    let sets: Vec<Vec<BindingResource<'_>>> = slices
+        .iter()
+        .map(|slice| {
+            let mut set = vec![
+                BindingResource::Uniform(constants),
+                BindingResource::Storage(&slice.results),
+                BindingResource::Storage(&slice.lane_states),
+                array_binding,
+            ];
+            set.extend(buffers.acceleration.as_ref().map(BindingResource::AccelerationStructure));
+            set
+        })
+        .collect();
+    let sets: Vec<&[BindingResource<'_>]> = sets.iter().map(Vec::as_slice).collect();
+    let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
+    Ok(Kernel::new(
+        gpu,
+        &KernelDescription {
+            name: "path_trace",
+            spirv,
+            workgroup_size,
+            constants: &key.specialization(),
+            driver_specializes: overrides.driver_specializes,
+            push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
+            sets: &sets,
+        },
+    )?)
+}
+
+/// What the shader loop has compiled, else the embedded variant, or one compiled from `--shaders`.
+fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
+    if let Some(spirv) = &settings.kernel_spirv {
+        return Ok(spirv.to_vec());
+    }
+    let Some(folder) = &settings.shaders_dir else {
+        let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
+        return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
+    };
+    let sources = shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
+    let defines =
+        [("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
+    shader_compiler::compile(&sources, "path_trace.comp", &defines).map_err(|e| Error::input(folder, e.to_string()))
+}
