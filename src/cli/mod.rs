@@ -61,6 +61,9 @@ enum Command {
     /// Renders for `watch`, which speaks to it over standard input and output.
     #[command(hide = true)]
     WatchWorker(Box<watch::WorkerArgs>),
+    /// Compiles for `watch`, likewise.
+    #[command(hide = true)]
+    WatchCompiler,
 }
 
 impl Cli {
@@ -93,6 +96,7 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Watch(args) => watch::run(&args),
         Command::Shaders(args) => Ok(shaders::run(&args)?),
         Command::WatchWorker(args) => watch::run_worker(&args),
+        Command::WatchCompiler => Ok(sunfleck::watch::compiler::run()?),
     }
 }
 

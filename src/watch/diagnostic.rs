@@ -1,12 +1,12 @@
 //! The compiler's message as file, line, column and the line itself.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::gpu::shader_compiler::{CompileError, ErrorAtLine, Sources};
 use crate::watch::includes::{reached_from, trail};
 
 /// One message of the compiler.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Diagnostic {
     /// File below the shader folder.
     pub file: String,
@@ -24,8 +24,10 @@ pub struct Diagnostic {
 
 impl std::fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.message)?;
-        if self.line > 0 {
+        if self.line == 0 {
+            write!(f, "{}: {}", self.file, self.message)?;
+        } else {
+            write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.message)?;
             // Tabs keep their width above the caret.
             let indent: String = self.source.chars().take(self.column.max(1) as usize - 1).collect();
             let indent: String = indent.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();

@@ -1,5 +1,6 @@
 //! The loop: files change, kernels are compiled, the worker is told, and what it says goes to the terminal and the page.
 
+mod compile;
 mod files;
 mod worker;
 
@@ -13,15 +14,16 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use self::files::Compiled;
+use self::compile::Compiler;
 use self::worker::start_worker;
+use super::compiler::CompileAnswer;
 use super::diagnostic::Diagnostic;
 use super::guard::Guard;
 use super::hub::Hub;
-use super::messages::{FromPage, Ready, Stage, ToWorker, View};
+use super::messages::{FromPage, FromWorker, Ready, Stage, ToWorker, View};
 use super::report::Report;
 use super::server::{Server, serve};
-use super::supervisor::{Heard, WorkerProcess};
+use super::supervisor::{Heard, Helper};
 use super::tracked::Tracker;
 use crate::Result;
 use crate::gpu::embedded;
@@ -63,9 +65,9 @@ pub struct Serving {
 }
 
 enum Event {
-    Worker(u32, Heard),
+    Worker(u32, Heard<FromWorker>),
     Files(BTreeSet<PathBuf>),
-    Compiled(Compiled),
+    Compiler(u32, Heard<CompileAnswer>),
     Page(u64, FromPage),
 }
 
@@ -81,10 +83,9 @@ struct Session {
     hub: Arc<Hub>,
     tracker: Tracker,
     scene_files: Vec<PathBuf>,
-    sources: Arc<Sources>,
-    /// Number of the compilation that counts: of older ones the result is dropped.
-    compilation: u32,
-    worker: WorkerProcess,
+    sources: Sources,
+    compiler: Compiler,
+    worker: Helper<ToWorker>,
     worker_number: u32,
     ready: Option<Ready>,
     stage: Stage,
@@ -136,8 +137,8 @@ impl Session {
             hub,
             tracker,
             scene_files: Vec::new(),
-            sources: Arc::new(sources),
-            compilation: 0,
+            sources,
+            compiler: Compiler::new(),
             worker,
             worker_number: 1,
             ready: None,
@@ -155,6 +156,7 @@ impl Session {
         session.track_scene()?;
         if let Some(folder) = session.options.shaders.clone() {
             session.tracker.add(&folder, true)?;
+            session.start_compiler()?;
         }
         Ok(session)
     }
@@ -170,9 +172,9 @@ impl Session {
                 // The last words of a worker that was replaced.
                 Some(Event::Worker(..)) => {}
                 Some(Event::Files(paths)) => self.files_changed(&paths)?,
-                Some(Event::Compiled(compiled)) => self.compiled(compiled),
+                Some(Event::Compiler(number, heard)) => self.hear_compiler(number, heard),
                 Some(Event::Page(client, message)) => self.page_said(client, message),
-                None => self.worker_overdue()?,
+                None => self.overdue()?,
             }
         }
     }

@@ -11,17 +11,17 @@ use super::{CompiledKernel, Event, KERNEL, Options, Session};
 use crate::watch::hub::{ToPage, packed};
 use crate::watch::messages::{Frame, FromWorker, Ready, Stage, ToWorker};
 use crate::watch::report::Report;
-use crate::watch::supervisor::{Heard, WorkerProcess};
+use crate::watch::supervisor::{Heard, Helper};
 use crate::{Error, Result};
 
 /// Workers that may end with a kernel that was good before, in a row.
 const MOST_ENDS: u32 = 3;
 
 impl Session {
-    pub(super) fn hear(&mut self, heard: Heard) -> Result<()> {
+    pub(super) fn hear(&mut self, heard: Heard<FromWorker>) -> Result<()> {
         self.heard = Instant::now();
         let Heard::Message(message, bytes) = heard else {
-            let status = self.worker.end();
+            let status = self.worker.end_status();
             if self.ready.is_none() && self.worker_number == 1 {
                 return Err(start_error(status.and_then(|s| s.code())));
             }
@@ -29,7 +29,7 @@ impl Session {
             return self.replace_worker(&format!("has ended ({status})"));
         };
         match message {
-            FromWorker::Ready(ready) => self.worker_ready(ready),
+            FromWorker::Ready(ready) => self.worker_ready(ready)?,
             FromWorker::Building { edit } => {
                 self.building = Some((edit, Instant::now()));
                 self.show_status();
@@ -70,7 +70,7 @@ impl Session {
         Ok(())
     }
 
-    pub(super) fn worker_ready(&mut self, ready: Ready) {
+    pub(super) fn worker_ready(&mut self, ready: Ready) -> Result<()> {
         let variant_changed = self.ready.as_ref().is_none_or(|before| before.variant != ready.variant);
         if self.ready.is_none() {
             self.say(&format!("{} on {}", ready.scene, ready.device));
@@ -81,10 +81,11 @@ impl Session {
             Some(kernel) if !variant_changed => {
                 self.worker.tell(ToWorker::Kernel { edit: kernel.edit }, kernel.spirv.to_vec());
             }
-            Some(kernel) => self.compile(kernel.edit, Instant::now(), None),
-            None => self.read_shaders(Instant::now()),
+            Some(kernel) => self.compile(kernel.edit, Instant::now(), None)?,
+            None => self.read_shaders(Instant::now())?,
         }
         self.show_status();
+        Ok(())
     }
 
     pub(super) fn frame(&mut self, frame: &Frame, png: &[u8]) {
@@ -112,17 +113,23 @@ impl Session {
         self.reports.iter_mut().rev().find(|report| report.edit == edit)
     }
 
-    /// When the worker will have been silent, or will have built one kernel, for too long.
+    /// When the worker will have been silent, or will have built one kernel, or the compiler will have been at one, for too
+    /// long.
     pub(super) fn overdue_at(&self) -> Option<Instant> {
         let silent = (self.stage == Stage::Render).then_some(self.heard);
-        let since = silent.into_iter().chain(self.building.map(|(_, since)| since)).min()?;
+        let building = self.building.map(|(_, since)| since);
+        let since = [silent, building, self.compiler.started()].into_iter().flatten().min()?;
         Some(since + self.options.hang)
     }
 
-    pub(super) fn worker_overdue(&mut self) -> Result<()> {
+    pub(super) fn overdue(&mut self) -> Result<()> {
         let seconds = self.options.hang.as_secs();
-        let is_silent = self.stage == Stage::Render && self.heard.elapsed() >= self.options.hang;
-        let what = if is_silent { "silent" } else { "at it" };
+        let is_overdue = |since: Instant| since.elapsed() >= self.options.hang;
+        if self.compiler.started().is_some_and(is_overdue) {
+            self.compiler_failed(&format!("the compiler has been at this for {seconds} s"));
+            return Ok(());
+        }
+        let what = if self.stage == Stage::Render && is_overdue(self.heard) { "silent" } else { "at it" };
         self.replace_worker(&format!("has been {what} for {seconds} s"))
     }
 
@@ -154,9 +161,9 @@ impl Session {
     }
 }
 
-pub(super) fn start_worker(options: &Options, number: u32, events: &Sender<Event>) -> Result<WorkerProcess> {
+pub(super) fn start_worker(options: &Options, number: u32, events: &Sender<Event>) -> Result<Helper<ToWorker>> {
     let events = events.clone();
-    WorkerProcess::start(&options.worker_arguments, move |heard| {
+    Helper::start(&options.worker_arguments, move |heard| {
         let _ = events.send(Event::Worker(number, heard));
     })
 }
