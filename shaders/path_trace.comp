@@ -26,6 +26,17 @@ layout(set = 0, binding = 1, std430) writeonly buffer ResultBlock { BlockResult 
 layout(set = 0, binding = 2, std430) buffer LaneBlock { LaneState lanes[]; };
 layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 
+#ifdef DEBUG_PRINTS
+// The dispatch that prints has one lane; behind its result stand what it prints, and an empty header.
+uint debug_count = 0u;
+void debug_end() { results[1u + debug_count].rays = 0u; }
+void debug_write(uint header, uvec4 words) {
+    if (slice.prints == 0u || debug_count >= DEBUG_RECORDS) return;
+    debug_count += 1u;
+    results[debug_count] = BlockResult(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, header, words.x, words.y, words.z, words.w);
+}
+#endif
+
 // Longest path; reported when it is met. Roulette ends paths long before.
 const uint BOUNCE_CAP = 65535u;
 
@@ -61,8 +72,10 @@ void add_radiance(inout LaneState lane, uint bounce, vec3 light) {
     bool counts = bounce == 0u ? ADDS_EMISSION : (bounce == 1u ? ADDS_DIRECT : ADDS_INDIRECT);
     if (!counts) return;
     if (CLAMPS_INDIRECT && bounce >= 2u) light = clamp_light(light, constants.clamp_indirect);
+#ifndef DEBUG_VIEW
     lane.radiance += light;
     accumulate(lane, light);
+#endif
 }
 
 // The share of emission seen along a BSDF sample whose density light sampling matches with `light_pdf`.
@@ -193,6 +206,10 @@ bool scatter(inout LaneState lane, Surface surface, vec3 wo, Hit hit, LightRecei
 }
 
 void finish_sample(inout LaneState lane) {
+#ifdef DEBUG_VIEW
+    lane.radiance = take_debug_value();
+    accumulate(lane, lane.radiance);
+#endif
     uint bit = 1u << (lane.sample_index % BLOCK_SAMPLES);
     if (!is_finite(lane.radiance)) lane.non_finite |= bit;
     lane.luminance_squared += sqr(luminance(lane.radiance));
@@ -305,7 +322,7 @@ void render(inout LaneState lane, uint ray_limit) {
     while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
         trace_advance(trace, constants);
         if (!trace_done(trace)) continue;
-        if (!advance_path(lane, trace_hit(trace))) next_sample(lane);
+        if (SAMPLE_ENDS(!advance_path(lane, trace_hit(trace)))) next_sample(lane);
         trace_begin(trace, constants, lane.ray, alpha_key(lane));
     }
 }
@@ -325,7 +342,7 @@ void render_baked(inout LaneState lane, uint ray_limit) {
             lane.rays += 1u;
             goes_on = finish_shadow(lane, !trace_occluded(constants, lane.ray));
         }
-        if (!goes_on) next_sample(lane);
+        if (SAMPLE_ENDS(!goes_on)) next_sample(lane);
     }
 }
 #endif
@@ -349,5 +366,8 @@ void main() {
     render(lane, ray_limit);
     bool complete = lane.sample_index >= lane.end_sample;
     results[index] = block_result(lane, complete);
+#ifdef DEBUG_PRINTS
+    if (slice.prints != 0u) debug_end();
+#endif
     lanes[index] = lane;
 }

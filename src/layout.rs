@@ -481,9 +481,14 @@ pub struct SliceConstants {
     pub ray_budget: u32,
     /// 1 if the lanes go on from their saved state.
     pub resume: u32,
+    /// 1 if the only lane writes what it prints behind its result (shaders/include/debug.glsl).
+    pub prints: u32,
     /// Unused, zero.
-    pub unused: [u32; 3],
+    pub unused: [u32; 2],
 }
+
+/// Most values that a lane prints.
+pub const DEBUG_RECORDS: u32 = 64;
 
 /// Samples of an aligned block.
 pub const BLOCK_SAMPLES: u32 = 16;

@@ -44,6 +44,10 @@ pub(crate) struct WatchArgs {
     /// No page: one line in the terminal for each save.
     #[arg(long, conflicts_with_all = ["port", "bind"], help_heading = "Page")]
     no_serve: bool,
+    /// The pixel whose DEBUG_PRINT values are shown, counted from the top left, until another is pinned on the page
+    /// [default: the one in the middle].
+    #[arg(long, value_name = "X,Y", value_parser = parse::pixel, help_heading = "Image")]
+    pixel: Option<[u32; 2]>,
     /// Replace the process that renders if it is silent for so long.
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = parse::duration, help_heading = "Device")]
     hang: Duration,
@@ -118,6 +122,8 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
             estimator: Estimator::of(&settings),
             exposure: args.tone.exposure,
             tonemap: args.tone.tonemap.to_string(),
+            debug: !args.no_serve,
+            pixel: args.pixel,
             ..View::default()
         },
         command: format!("sunfleck render {scene} {}", quoted.join(" ")),

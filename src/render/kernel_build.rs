@@ -1,17 +1,34 @@
 //! From a kernel's key to a kernel: the shader that fits, with what of the scene is compiled in.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::bake::{Bake, BakeReport};
 use super::kernel_key::KernelKey;
-use super::path_tracer::BindingOverride;
 use super::scene_buffers::{SceneBuffers, array_binding};
 use super::slices::Slice;
 use super::{Integrator, Settings};
-use crate::gpu::{BindingResource, Buffer, Gpu, Kernel, KernelDescription, embedded, shader_compiler};
+use crate::gpu::{ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, embedded, shader_compiler};
 use crate::layout::SliceConstants;
 use crate::prepare::Prepared;
 use crate::{Error, Result};
+
+/// How a [`PathTracer`] is bound, where the device's own choice is not wanted (tests try every form).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BindingOverride {
+    /// Form and log2 of the texels of a chunk.
+    pub array_form: Option<(ArrayForm, u32)>,
+    /// Lanes of a workgroup.
+    pub workgroup_size: Option<u32>,
+    /// Lanes of every slice.
+    pub slice_lanes: Option<u32>,
+    /// Rays a lane may trace in one dispatch.
+    pub ray_budget: Option<u32>,
+    /// Time a slice should take, where another than the usual is wanted.
+    pub slice_time: Option<Duration>,
+    /// The driver puts in the specialisation constants, not [`crate::gpu::specialize`].
+    pub driver_specializes: bool,
+}
 
 /// An integrator that adds nothing behind the first scattering events need not look there.
 pub(super) fn effective_max_bounces(settings: &Settings) -> u32 {

@@ -9,7 +9,7 @@ use ash::vk::BufferUsageFlags as Usage;
 use glam::DVec3;
 
 use super::bake::BakeReport;
-use super::kernel_build::{baked_spirv, build_kernel, effective_max_bounces};
+use super::kernel_build::{BindingOverride, baked_spirv, build_kernel, effective_max_bounces};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
 use super::scene_buffers::{SceneBuffers, choose_array_form};
@@ -17,36 +17,19 @@ use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
 use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
-use crate::gpu::{ArrayForm, Buffer, Gpu, Kernel, MemoryUse, TraceBackend};
+use crate::gpu::{Buffer, Gpu, Kernel, MemoryUse, TraceBackend};
 use crate::layout::RenderConstants;
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
 
-/// How a [`PathTracer`] is bound, where the device's own choice is not wanted (tests try every form).
-#[derive(Clone, Copy, Debug, Default)]
-pub struct BindingOverride {
-    /// Form and log2 of the texels of a chunk.
-    pub array_form: Option<(ArrayForm, u32)>,
-    /// Lanes of a workgroup.
-    pub workgroup_size: Option<u32>,
-    /// Lanes of every slice.
-    pub slice_lanes: Option<u32>,
-    /// Rays a lane may trace in one dispatch.
-    pub ray_budget: Option<u32>,
-    /// Time a slice should take, where another than the usual is wanted.
-    pub slice_time: Option<Duration>,
-    /// The driver puts in the specialisation constants, not [`crate::gpu::specialize`].
-    pub driver_specializes: bool,
-}
-
 /// A scene on a device, ready to be rendered.
 pub struct PathTracer {
     key: KernelKey,
-    kernel: Kernel,
-    constants: RenderConstants,
-    constants_buffer: Buffer,
-    slices: Vec<Slice>,
+    pub(super) kernel: Kernel,
+    pub(super) constants: RenderConstants,
+    pub(super) constants_buffer: Buffer,
+    pub(super) slices: Vec<Slice>,
     buffers: Arc<SceneBuffers>,
     overrides: BindingOverride,
     bake: BakeReport,

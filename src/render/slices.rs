@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use ash::vk::BufferUsageFlags as Usage;
 
-use super::path_tracer::BindingOverride;
+use super::kernel_build::BindingOverride;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
-use crate::layout::{BlockResult, LANE_STATE_BYTES, SliceConstants};
+use crate::layout::{BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, SliceConstants};
 
 /// Slices that are submitted before the oldest is read.
 pub(super) const SLICES_IN_FLIGHT: usize = 2;
@@ -38,14 +38,10 @@ pub(super) struct SliceOutcome {
 impl Slice {
     pub(super) fn new(gpu: &Arc<Gpu>, lanes: u32) -> Result<Self> {
         let bytes = |each: usize| u64::from(lanes) * each as u64;
+        // Behind the result of the lane that prints there is room for what it prints.
+        let results = u64::from(lanes.max(2 + DEBUG_RECORDS)) * size_of::<BlockResult>() as u64;
         Ok(Self {
-            results: Buffer::new(
-                gpu,
-                "block results",
-                bytes(size_of::<BlockResult>()),
-                Usage::STORAGE_BUFFER,
-                MemoryUse::Readback,
-            )?,
+            results: Buffer::new(gpu, "block results", results, Usage::STORAGE_BUFFER, MemoryUse::Readback)?,
             lane_states: Buffer::new(
                 gpu,
                 "lane states",

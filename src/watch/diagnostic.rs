@@ -65,7 +65,7 @@ pub fn diagnose(error: &CompileError, sources: &Sources) -> Vec<Diagnostic> {
 }
 
 /// glslang names no column, but quotes what it stumbled over.
-fn column_of(message: &str, source: &str) -> u32 {
+pub(super) fn column_of(message: &str, source: &str) -> u32 {
     let quoted = message.split('\'').nth(1).filter(|word| !word.is_empty());
     let byte = quoted.and_then(|word| find_word(source, word));
     let byte = byte.unwrap_or_else(|| source.len() - source.trim_start().len());

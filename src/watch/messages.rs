@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::render::Settings;
+pub use super::estimator::Estimator;
 
 /// What is to be seen: the whole of it every time, so that a new worker needs no history.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -21,50 +21,10 @@ pub struct View {
     pub exposure: f32,
     /// Name of a [`crate::film::tonemap::ToneMap`].
     pub tonemap: String,
-}
-
-/// The estimator that is shown: all but `max_bounces` are specialisation constants of the kernel.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Estimator {
-    /// Name of a [`crate::render::Integrator`].
-    pub integrator: String,
-    /// Name of a [`crate::render::LightSampling`].
-    pub light_sampling: String,
-    /// Name of a [`crate::render::MisHeuristic`].
-    pub mis: String,
-    /// Name of a [`crate::render::SamplerKind`].
-    pub sampler: String,
-    /// Scattering events a path may have; `None` is unlimited.
-    pub max_bounces: Option<u32>,
-}
-
-impl Estimator {
-    /// Of settings.
-    pub fn of(settings: &Settings) -> Self {
-        Self {
-            integrator: settings.integrator.name().to_owned(),
-            light_sampling: settings.light_sampling.name().to_owned(),
-            mis: settings.mis_heuristic.name().to_owned(),
-            sampler: settings.sampler.name().to_owned(),
-            max_bounces: settings.max_bounces,
-        }
-    }
-
-    /// Puts it into settings. A name that means nothing changes nothing.
-    pub fn apply(&self, settings: &mut Settings) {
-        Self::read(&mut settings.integrator, &self.integrator);
-        Self::read(&mut settings.light_sampling, &self.light_sampling);
-        Self::read(&mut settings.mis_heuristic, &self.mis);
-        Self::read(&mut settings.sampler, &self.sampler);
-        settings.max_bounces = self.max_bounces;
-    }
-
-    fn read<T: std::str::FromStr>(target: &mut T, name: &str) {
-        if let Ok(value) = name.parse() {
-            *target = value;
-        }
-    }
+    /// The picture is what shaders give to DEBUG_PIXEL, if any does.
+    pub debug: bool,
+    /// The pixel (column, row) whose DEBUG_PRINT values are shown; `None` is the one in the middle.
+    pub pixel: Option<[u32; 2]>,
 }
 
 /// A camera by what it looks at. World space, metres.
@@ -87,6 +47,8 @@ pub enum ToWorker {
     Kernel {
         /// Number of the edit that it comes from.
         edit: u32,
+        /// It was compiled with DEBUG_PRINTS.
+        prints: bool,
     },
     /// An edit is about to be compiled: leave the processor to it, unless the picture moves or is not there yet.
     Hold,
@@ -212,6 +174,15 @@ pub enum FromWorker {
         variance: Option<f64>,
         /// What is seen there.
         seen: Option<Seen>,
+    },
+    /// What the kernel prints for the first sample of a pixel.
+    Prints {
+        /// Number of the edit.
+        edit: u32,
+        /// Column and row.
+        pixel: [u32; 2],
+        /// The number of the line that prints, and the value.
+        values: Vec<(u32, String)>,
     },
     /// An image file follows.
     Saved {

@@ -6,7 +6,9 @@
 //! speak by [`wire`] over standard input and output.
 
 pub mod compiler;
+pub mod debug_calls;
 pub mod diagnostic;
+mod estimator;
 pub mod guard;
 pub mod hub;
 pub mod includes;

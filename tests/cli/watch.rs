@@ -194,3 +194,29 @@ fn a_kernel_that_hangs_or_kills_the_device_is_named_and_the_last_good_one_goes_o
     std::fs::write(&kernel, &loop_ends).unwrap();
     watch.expect(&["path_trace.comp:", "first image", "64 spp"]);
 }
+
+#[test]
+fn printed_values_are_those_of_the_pixel_with_the_line_that_prints_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let shaders = folder.path().join("shaders");
+    assert_eq!(export(&shaders, &[]).0, Some(0));
+    // The left wall is red, the right one green: what is printed is the pixel's own.
+    let leaf = shaders.join("include/bsdf_lambertian.glsl");
+    let original = std::fs::read_to_string(&leaf).unwrap();
+    let print = "    DEBUG_PRINT(p.color); DEBUG_PRINT(uvec2(7, 8)); DEBUG_PRINT(wo.y > 0.0);\n";
+    let scatter = "vec3 wi = sample_cosine_hemisphere(u.yz);\n";
+    assert!(original.contains(scatter));
+    std::fs::write(&leaf, original.replace(scatter, &format!("{scatter}{print}"))).unwrap();
+    let line = original.lines().position(|line| line.contains(scatter.trim())).unwrap() + 2;
+    let mut colours = Vec::new();
+    for pixel in ["1,16", "30,16"] {
+        let watch = Watch::start(&["--spp", "4", "--pixel", pixel], &shaders);
+        watch.expect(&[&format!("pixel {pixel} prints"), "values"]);
+        let place = format!("  include/bsdf_lambertian.glsl:{line}: ");
+        let colour = watch.expect(&[&place, "p.color = ("]);
+        colours.push(colour.rsplit(" = ").next().unwrap().to_owned());
+        watch.expect(&[&place, "uvec2(7, 8) = (7, 8)"]);
+        watch.expect(&[&place, "wo.y > 0.0 = true"]);
+    }
+    assert_ne!(colours[0], colours[1]);
+}

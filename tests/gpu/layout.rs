@@ -139,8 +139,8 @@ fn blocks_have_the_same_offsets_on_both_sides() {
     assert_eq!(shader_fields(&blocks.constants), render_constants_fields());
     assert_eq!(Type::Struct(blocks.constants).nbyte(), Some(size_of::<RenderConstants>()));
 
-    let mut slice = rust_fields!(SliceConstants: first_atom, lanes, first_block, ray_budget, resume, unused);
-    split(&mut slice, "unused", &["_0", "_1", "_2"], "u32");
+    let mut slice = rust_fields!(SliceConstants: first_atom, lanes, first_block, ray_budget, resume, prints, unused);
+    split(&mut slice, "unused", &["_0", "_1"], "u32");
     assert_eq!(shader_fields(&blocks.slice), slice);
     assert_eq!(Type::Struct(blocks.slice).nbyte(), Some(size_of::<SliceConstants>()));
 

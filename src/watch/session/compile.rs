@@ -7,7 +7,8 @@ use std::time::Instant;
 use super::{CompiledKernel, Event, KERNEL, LISTED_EDITS, Session};
 use crate::Result;
 use crate::watch::compiler::{CompileAnswer, CompileOrder};
-use crate::watch::diagnostic::Diagnostic;
+use crate::watch::debug_calls::{DebugCalls, number_calls};
+use crate::watch::diagnostic::{Diagnostic, column_of};
 use crate::watch::messages::ToWorker;
 use crate::watch::report::Report;
 use crate::watch::supervisor::{Heard, Helper};
@@ -28,6 +29,7 @@ struct Order {
     saved: Instant,
     /// The files that changed; `None` if none did, and the kernel is compiled for another device.
     what: Option<String>,
+    calls: DebugCalls,
 }
 
 impl Compiler {
@@ -62,15 +64,15 @@ impl Session {
         let [trace, form] = ready.variant;
         self.start_compiler()?;
         self.worker.tell(ToWorker::Hold, Vec::new());
-        self.compiler.order_number += 1;
-        self.compiler.order = Some(Order { edit, started: Instant::now(), saved, what });
+        let (sources, calls) = number_calls(&self.sources, KERNEL);
         let define = |name: &str, value: u32| (name.to_owned(), value.to_string());
-        let order = CompileOrder {
-            number: self.compiler.order_number,
-            file: KERNEL.to_owned(),
-            defines: vec![define("TRACE_BACKEND", trace), define("ARRAY_FORM", form)],
-            sources: self.sources.clone(),
-        };
+        let mut defines = vec![define("TRACE_BACKEND", trace), define("ARRAY_FORM", form)];
+        defines.extend((calls.has_pixel && self.view.debug).then(|| define("DEBUG_VIEW", 1)));
+        defines.extend((!calls.prints.is_empty()).then(|| define("DEBUG_PRINTS", 1)));
+        self.compiler.order_number += 1;
+        self.compiler.order = Some(Order { edit, started: Instant::now(), saved, what, calls });
+        let number = self.compiler.order_number;
+        let order = CompileOrder { number, file: KERNEL.to_owned(), defines, sources };
         if let Some(process) = &self.compiler.process {
             process.tell(order, Vec::new());
         }
@@ -114,7 +116,7 @@ impl Session {
 
     fn compiled(&mut self, order: Order, answer: CompileAnswer, spirv: Vec<u8>) {
         let edit = order.edit;
-        self.errors = answer.errors;
+        self.errors = answer.errors.into_iter().map(|error| self.as_written(error)).collect();
         if self.errors.is_empty() {
             self.notice = None;
             if let Some(what) = order.what {
@@ -123,14 +125,30 @@ impl Session {
                 self.list(report);
             }
             let spirv: Arc<[u8]> = spirv.into();
-            self.worker.tell(ToWorker::Kernel { edit }, spirv.to_vec());
-            self.current = Some(CompiledKernel { edit, spirv });
+            let prints = !order.calls.prints.is_empty();
+            if !prints {
+                self.prints = None;
+            }
+            self.worker.tell(ToWorker::Kernel { edit, prints }, spirv.to_vec());
+            self.current = Some(CompiledKernel { edit, spirv, calls: order.calls });
         } else {
             self.worker.tell(ToWorker::Resume, Vec::new());
             let lines: Vec<_> = self.errors.iter().map(ToString::to_string).collect();
             self.say(&format!("error: {}", lines.join("\nerror: ")));
         }
         self.show_status();
+    }
+
+    /// An error at the line as its author wrote it, not as [`number_calls`] made it.
+    fn as_written(&self, error: Diagnostic) -> Diagnostic {
+        let line = (error.line as usize).checked_sub(1);
+        let written = line.and_then(|line| self.sources.get(&error.file)?.lines().nth(line));
+        match written.filter(|written| *written != error.source) {
+            Some(source) => {
+                Diagnostic { column: column_of(&error.message, source), source: source.to_owned(), ..error }
+            }
+            None => error,
+        }
     }
 
     pub(super) fn list(&mut self, report: Report) {

@@ -12,11 +12,13 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use serde_json::json;
 
 use self::compile::Compiler;
 use self::worker::start_worker;
 use super::compiler::CompileAnswer;
+use super::debug_calls::{DebugCalls, PrintPlace};
 use super::diagnostic::Diagnostic;
 use super::guard::Guard;
 use super::hub::Hub;
@@ -75,6 +77,16 @@ enum Event {
 struct CompiledKernel {
     edit: u32,
     spirv: Arc<[u8]>,
+    calls: DebugCalls,
+}
+
+/// What the kernel printed for a pixel.
+#[derive(Serialize)]
+struct Prints {
+    #[serde(skip)]
+    edit: u32,
+    pixel: [u32; 2],
+    values: Vec<(PrintPlace, String)>,
 }
 
 struct Session {
@@ -101,6 +113,7 @@ struct Session {
     errors: Vec<Diagnostic>,
     notice: Option<String>,
     reports: Vec<Report>,
+    prints: Option<Prints>,
 }
 
 /// Runs until the process is ended.
@@ -151,6 +164,7 @@ impl Session {
             edit: 0,
             errors: Vec::new(),
             notice: None,
+            prints: None,
             reports: vec![Report::new(0, "start".to_owned(), now)],
         };
         session.track_scene()?;
@@ -173,19 +187,25 @@ impl Session {
                 Some(Event::Worker(..)) => {}
                 Some(Event::Files(paths)) => self.files_changed(&paths)?,
                 Some(Event::Compiler(number, heard)) => self.hear_compiler(number, heard),
-                Some(Event::Page(client, message)) => self.page_said(client, message),
+                Some(Event::Page(client, message)) => self.page_said(client, message)?,
                 None => self.overdue()?,
             }
         }
     }
 
-    fn page_said(&mut self, client: u64, message: FromPage) {
+    fn page_said(&mut self, client: u64, message: FromPage) -> Result<()> {
         match message {
             FromPage::View(view) => {
                 // Beyond, exposures are infinite or nothing.
                 let exposure = if view.exposure.is_finite() { view.exposure.clamp(-100.0, 100.0) } else { 0.0 };
-                self.view = View { exposure, ..view };
+                let before = std::mem::replace(&mut self.view, View { exposure, ..view });
                 self.worker.tell(ToWorker::View(self.view.clone()), Vec::new());
+                match &self.current {
+                    Some(kernel) if kernel.calls.has_pixel && before.debug != self.view.debug => {
+                        return self.compile(kernel.edit, Instant::now(), None);
+                    }
+                    _ => {}
+                }
             }
             FromPage::Inspect { x, y } => self.worker.tell(ToWorker::Inspect { client, x, y }, Vec::new()),
             FromPage::Save { format } if ["png", "exr"].contains(&format.as_str()) => {
@@ -193,6 +213,7 @@ impl Session {
             }
             FromPage::Save { .. } => {}
         }
+        Ok(())
     }
 
     fn say(&self, text: &str) {
@@ -209,6 +230,8 @@ impl Session {
             "errors": self.errors,
             "notice": self.notice,
             "reports": self.reports,
+            "prints": self.prints,
+            "has_debug_pixel": self.current.as_ref().is_some_and(|kernel| kernel.calls.has_pixel),
             "command": self.options.command,
             "shaders": self.options.shaders,
         });

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{CompiledKernel, Event, KERNEL, Options, Session};
+use super::{CompiledKernel, Event, KERNEL, Options, Prints, Session};
 use crate::watch::hub::{ToPage, packed};
 use crate::watch::messages::{Frame, FromWorker, Ready, Stage, ToWorker};
 use crate::watch::report::Report;
@@ -60,6 +60,7 @@ impl Session {
                     "variance": variance, "seen": seen});
                 self.hub.reply(client, ToPage::Text(Arc::new(pixel.to_string())));
             }
+            FromWorker::Prints { edit, pixel, values } => self.printed(edit, pixel, values),
             FromWorker::Saved { client, format } => {
                 let name = Path::new(&self.options.scene).file_stem().map(|s| s.to_string_lossy().into_owned());
                 let name = format!("{}.{format}", name.unwrap_or_else(|| "image".to_owned()));
@@ -79,7 +80,8 @@ impl Session {
         self.worker.tell(ToWorker::View(self.view.clone()), Vec::new());
         match &self.current {
             Some(kernel) if !variant_changed => {
-                self.worker.tell(ToWorker::Kernel { edit: kernel.edit }, kernel.spirv.to_vec());
+                let prints = !kernel.calls.prints.is_empty();
+                self.worker.tell(ToWorker::Kernel { edit: kernel.edit, prints }, kernel.spirv.to_vec());
             }
             Some(kernel) => self.compile(kernel.edit, Instant::now(), None)?,
             None => self.read_shaders(Instant::now())?,
@@ -98,7 +100,9 @@ impl Session {
         self.hub.set_frame(&json.to_string(), png);
         let Some(index) = self.reports.iter().rposition(|report| report.edit == frame.edit) else { return };
         let before = self.reports[..index].iter().rev().find(|report| report.is_measured).cloned();
-        let view = format!("{} {:?} {:?}", self.view.camera, self.view.pose, self.view.estimator);
+        let shows_value = self.view.debug && self.current.as_ref().is_some_and(|kernel| kernel.calls.has_pixel);
+        let (camera, pose, estimator) = (self.view.camera, self.view.pose, &self.view.estimator);
+        let view = format!("{camera} {pose:?} {estimator:?} {shows_value}");
         let is_first = self.reports[index].first_image_ms.is_none();
         if self.reports[index].observe(frame, &view, before.as_ref()) {
             let line = self.reports[index].to_string();
@@ -109,7 +113,26 @@ impl Session {
         }
     }
 
-    pub(super) fn report(&mut self, edit: u32) -> Option<&mut Report> {
+    /// In the terminal once an edit; the page shows it for each pixel that is pinned.
+    fn printed(&mut self, edit: u32, pixel: [u32; 2], values: Vec<(u32, String)>) {
+        let places = self.current.as_ref().map_or(&[][..], |kernel| &kernel.calls.prints);
+        let placed = |(place, value): (u32, String)| {
+            let place = places.get((place as usize).checked_sub(1)?)?;
+            Some((place.clone(), value))
+        };
+        let values: Vec<_> = values.into_iter().filter_map(placed).collect();
+        let prints = Prints { edit, pixel, values };
+        if self.prints.as_ref().is_none_or(|before| before.edit != edit) {
+            self.say(&format!("pixel {},{} prints {} values", pixel[0], pixel[1], prints.values.len()));
+            for (place, value) in &prints.values {
+                self.say(&format!("  {}:{}: {} = {value}", place.file, place.line, place.text));
+            }
+        }
+        self.prints = Some(prints);
+        self.show_status();
+    }
+
+    fn report(&mut self, edit: u32) -> Option<&mut Report> {
         self.reports.iter_mut().rev().find(|report| report.edit == edit)
     }
 

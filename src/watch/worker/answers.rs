@@ -30,6 +30,19 @@ impl Worker {
         }
     }
 
+    /// Says what the kernel prints for the pixel of the view. Not while the camera moves.
+    pub(super) fn print(&mut self) -> Result<()> {
+        if !self.front.prints || self.view.moving {
+            return Ok(());
+        }
+        let size = [self.settings.width, self.settings.height];
+        let wanted = self.view.pixel.unwrap_or(size.map(|n| n / 2));
+        let pixel = [0, 1].map(|i| wanted[i].min(size[i] - 1));
+        let values = self.front.tracer.prints(self.settings.seed, pixel.into(), 0)?;
+        let values = values.into_iter().map(|printed| (printed.place, printed.value)).collect();
+        say(&FromWorker::Prints { edit: self.edit, pixel, values }, &[])
+    }
+
     pub(super) fn inspect(&self, client: u64, x: u32, y: u32) -> Result<()> {
         let Some(film) = self.shown.film.as_ref().filter(|f| x < f.width() && y < f.height()) else { return Ok(()) };
         let pixel = &film.pixels()[(y * film.width() + x) as usize];

@@ -19,6 +19,8 @@ pub(super) struct Wanted {
     pub(super) edit: u32,
     pub(super) settings: Settings,
     pub(super) view: View,
+    /// The kernel was compiled with DEBUG_PRINTS.
+    pub(super) prints: bool,
     /// Load the scene anew.
     pub(super) reload: bool,
 }
@@ -28,6 +30,8 @@ pub(super) struct Front {
     pub(super) loaded: Arc<Loaded>,
     pub(super) tracer: PathTracer,
     pub(super) settings: Settings,
+    /// Its kernel prints.
+    pub(super) prints: bool,
 }
 
 /// What came of an order; `Err` has the tracer back, which is as it was.
@@ -143,7 +147,7 @@ impl Builder {
 fn new_front(device: &OpenDevice, gpu: &Arc<Gpu>, loaded: Arc<Loaded>, wanted: &Wanted) -> Result<Front> {
     let camera = camera_of(&loaded.scene, &wanted.view)?;
     let tracer = PathTracer::new(gpu, device.trace, &loaded.prepared, &camera, &wanted.settings, BINDING)?;
-    Ok(Front { loaded, tracer, settings: wanted.settings.clone() })
+    Ok(Front { loaded, tracer, settings: wanted.settings.clone(), prints: wanted.prints })
 }
 
 fn build(device: &OpenDevice, order: Order, load: &LoadScene) -> Outcome {
@@ -158,8 +162,8 @@ fn build(device: &OpenDevice, order: Order, load: &LoadScene) -> Outcome {
         Ok(camera) => camera,
         Err(error) => return Outcome { wanted, built: Err(error), behind },
     };
-    let settings = wanted.settings.clone();
-    let front = |tracer| Front { loaded: Arc::clone(&loaded), tracer, settings };
+    let (settings, prints) = (wanted.settings.clone(), wanted.prints);
+    let front = |tracer| Front { loaded: Arc::clone(&loaded), tracer, settings, prints };
     let Some(mut tracer) = behind else {
         let tracer = PathTracer::beside(&buffers, &gpu, &loaded.prepared, &camera, &wanted.settings, BINDING);
         return Outcome { built: tracer.map(front), wanted, behind: None };

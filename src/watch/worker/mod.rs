@@ -46,12 +46,13 @@ pub fn run(settings: Settings, load: LoadScene) -> Result<()> {
     say(&FromWorker::Stage(Stage::Load), &[])?;
     let device = open_device(&settings)?;
     let view = View { estimator: Estimator::of(&settings), ..View::default() };
-    let wanted = Wanted { edit: 0, settings, view: view.clone(), reload: false };
+    let wanted = Wanted { edit: 0, settings, view: view.clone(), prints: false, reload: false };
     let (builder, front) = Builder::start(device, &wanted, load, done)?;
     let aim = KernelKey { baked: Baked::default(), ..*front.tracer.key() };
     let mut worker = Worker {
         camera: view.camera,
         settings: wanted.settings,
+        prints: false,
         view,
         builder,
         front,
@@ -87,6 +88,7 @@ fn say(message: &FromWorker, bytes: &[u8]) -> Result<()> {
 struct Worker {
     /// What is asked for; what is in front may still have others.
     settings: Settings,
+    prints: bool,
     view: View,
     builder: Builder,
     front: Front,
@@ -139,7 +141,7 @@ impl Worker {
             Incoming::Built(outcome) => self.built(*outcome),
             Incoming::Told(message, bytes) => match message {
                 ToWorker::View(view) => self.change_view(view),
-                ToWorker::Kernel { edit } => self.change_kernel(edit, &bytes),
+                ToWorker::Kernel { edit, prints } => self.change_kernel(edit, prints, &bytes),
                 ToWorker::Scene { edit } => self.order(edit, true),
                 ToWorker::Hold => {
                     self.hold = Some(Instant::now() + LONGEST_HOLD);
@@ -173,6 +175,8 @@ impl Worker {
             self.restart();
         } else if (old.exposure, &old.tonemap) != (self.view.exposure, &self.view.tonemap) {
             return self.send_frame();
+        } else if old.pixel != self.view.pixel && self.shown.spp > 0 {
+            return self.print();
         }
         Ok(())
     }
@@ -193,7 +197,8 @@ impl Worker {
         Ok((self.key_of_view()? == self.key_in_front()).then_some(self.view.camera))
     }
 
-    fn change_kernel(&mut self, edit: u32, bytes: &[u8]) -> Result<()> {
+    fn change_kernel(&mut self, edit: u32, prints: bool, bytes: &[u8]) -> Result<()> {
+        self.prints = prints;
         let words = bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]));
         self.settings.kernel_spirv = Some(words.collect::<Vec<_>>().into());
         self.order(edit, false)
@@ -203,7 +208,7 @@ impl Worker {
         self.aim = self.key_of_view()?;
         let before = self.builder.in_work();
         let (settings, view) = (self.settings.clone(), self.view.clone());
-        self.builder.order(Wanted { edit, settings, view, reload }, &self.front);
+        self.builder.order(Wanted { edit, settings, view, prints: self.prints, reload }, &self.front);
         if before.is_none() { self.building() } else { Ok(()) }
     }
 
@@ -236,6 +241,7 @@ impl Worker {
             Err(error) => {
                 // The next order must not fail for what this one brought.
                 self.settings.kernel_spirv = self.front.settings.kernel_spirv.clone();
+                self.prints = self.front.prints;
                 self.aim = self.key_in_front();
                 say(&FromWorker::Failed { edit, message: error.to_string() }, &[])?;
                 self.building()
@@ -283,6 +289,9 @@ impl Worker {
             return self.take(incoming);
         }
         self.shown.add(run, end);
+        if first == 0 {
+            self.print()?;
+        }
         if self.is_done() || self.shown.is_due() { self.send_frame() } else { Ok(()) }
     }
 }
