@@ -194,6 +194,53 @@ try {
     await page.waitForFunction(() => document.getElementById("pixel-samples").textContent === "64");
     const radiance = (await page.textContent("#pixel-radiance")).trim().split(/\s+/).map(Number);
     assert(radiance.length === 3 && radiance.every((c) => c >= 0), `${radiance}`);
+    assert.match(await page.textContent("#pixel-material"), /\(lambertian/);
+    assert.match(await page.textContent("#pixel-triangle"), /^\d+ of primitive \d+$/);
+    assert.match(await page.textContent("#pixel-distance"), / m$/);
+  });
+  await step("DEBUG_PIXEL is the picture, DEBUG_PRINT is listed with its line", async () => {
+    const light = await mean();
+    const call = "DEBUG_PIXEL(vec3(0.0, 0.5, 1.0)); DEBUG_PRINT(p.color);";
+    const scatter = "vec3 wi = sample_cosine_hemisphere(u.yz);";
+    assert(original.includes(scatter));
+    const now = await page.evaluate(() => Number(document.body.dataset.edit));
+    writeFileSync(leaf, original.replace(scatter, `${call}\n    ${scatter}`));
+    await edit(now + 1);
+    const [r, g, b] = await mean();
+    assert(r < 5 && g > 100 && b > 200, `${[r, g, b]}`);
+    await page.waitForFunction(() => document.getElementById("prints-list").textContent.includes("p.color = ("));
+    assert.match(await page.textContent("#prints-list"), /bsdf_lambertian.glsl:\d+/);
+    await shot("debug");
+    await page.keyboard.press("v");
+    await page.waitForTimeout(1500);
+    await finished();
+    const back = await mean();
+    assert(Math.abs(back[0] - light[0]) < 5, `the calls stand there, the light is shown: ${light} ${back}`);
+    await page.keyboard.press("v");
+    writeFileSync(leaf, original);
+    await page.waitForFunction(() => document.getElementById("debug-row").hidden && document.getElementById("prints").hidden);
+    await edit(now + 2);
+    await finished();
+  });
+  await step("other estimators", async () => {
+    const light = await mean();
+    const starts = () => page.evaluate(() => document.body.dataset.start);
+    for (const [id, value] of [["light-sampling", "bsdf"], ["light-sampling", "mis"], ["sampler", "independent"], ["sampler", "sobol"]]) {
+      const before = await starts();
+      await page.selectOption(`#${id}`, value);
+      await page.waitForFunction((before) => document.body.dataset.start !== before, before, { timeout: 60000 });
+      assert((await page.textContent("#command")).includes(`--${id}=${value}`));
+    }
+    const before = await starts();
+    await page.fill("#max-bounces", "1");
+    await page.keyboard.press("Tab");
+    await page.waitForFunction((before) => document.body.dataset.start !== before, before, { timeout: 60000 });
+    const direct = await mean();
+    assert(direct[0] < light[0] - 5, `${light} ${direct}`);
+    await page.fill("#max-bounces", "");
+    await page.keyboard.press("Tab");
+    await page.waitForTimeout(1000);
+    await finished();
   });
   await step("save", async () => {
     for (const [button, magic] of [["#png", "89504e47"], ["#exr", "762f3101"]]) {
@@ -208,6 +255,8 @@ try {
     await page.emulateMedia({ colorScheme: "dark" });
     await page.waitForTimeout(300);
     await shot("small-dark");
+    await page.evaluate(() => document.querySelector("aside").scrollIntoView());
+    await shot("small-dark-controls");
     await page.setViewportSize({ width: 1600, height: 1000 });
     await page.waitForTimeout(300);
     await shot("large-dark");
