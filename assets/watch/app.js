@@ -94,5 +94,7 @@ new ResizeObserver(() => {
   plot.draw();
 }).observe($("scroller"));
 
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plot.draw());
+
 listen(picture, compare);
 connect();

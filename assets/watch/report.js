@@ -36,18 +36,22 @@ const ratio = (value) => (value === null ? "" : ` ×${value.toFixed(2)}`);
 const percent = (value) => `${(100 * value).toPrecision(2)} %`;
 
 export function showEdits(status) {
-  const rows = status.reports.toReversed().map((report) => {
+  const rows = status.reports.toReversed().flatMap((report) => {
     const error = report.error === null || !report.is_measured ? "–" : percent(report.error);
-    const row = document.createElement("tr");
-    row.title = `${report.what}: GLSL to SPIR-V ${ms(report.compile_ms)}, the driver's build ${ms(report.build_ms)}, `
+    const [head, row] = [document.createElement("tr"), document.createElement("tr")];
+    head.className = "name";
+    head.title = row.title = `${report.what}: GLSL to SPIR-V ${ms(report.compile_ms)}, the driver's build ${ms(report.build_ms)}, `
       + `save to the first image ${ms(report.first_image_ms)}; ${report.spp} samples per pixel`;
     const name = report.what.replaceAll(/[^ ,]*\//g, "");
+    const named = element("td", `${report.edit} ${name}`);
+    named.colSpan = 5;
+    head.append(named);
     const cells = [
-      `${report.edit} ${name}`, ms(report.compile_ms), ms(report.build_ms), ms(report.first_image_ms),
+      ms(report.compile_ms), ms(report.build_ms), ms(report.first_image_ms),
       rate(report.rays_per_second) + ratio(report.speed_ratio), error + ratio(report.error_ratio),
     ];
     row.append(...cells.map((text) => element("td", text)));
-    return row;
+    return [head, row];
   });
   $("edits").replaceChildren(...rows);
 }

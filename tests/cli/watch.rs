@@ -211,7 +211,7 @@ fn printed_values_are_those_of_the_pixel_with_the_line_that_prints_them() {
     let mut colours = Vec::new();
     for pixel in ["1,16", "30,16"] {
         let watch = Watch::start(&["--spp", "4", "--pixel", pixel], &shaders);
-        watch.expect(&[&format!("pixel {pixel} prints"), "values"]);
+        watch.expect(&[&format!("pixel {pixel} prints"), "value"]);
         let place = format!("  include/bsdf_lambertian.glsl:{line}: ");
         let colour = watch.expect(&[&place, "p.color = ("]);
         colours.push(colour.rsplit(" = ").next().unwrap().to_owned());

@@ -260,6 +260,12 @@ try {
     await page.setViewportSize({ width: 1600, height: 1000 });
     await page.waitForTimeout(300);
     await shot("large-dark");
+    await page.setViewportSize({ width: 1920, height: 1080 });
+    await page.waitForTimeout(300);
+    await shot("wide-dark");
+    await page.emulateMedia({ colorScheme: "light" });
+    await page.waitForTimeout(300);
+    await shot("wide");
     const overflow = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
     assert(!overflow, "the page scrolls sideways");
   });

@@ -123,7 +123,9 @@ impl Session {
         let values: Vec<_> = values.into_iter().filter_map(placed).collect();
         let prints = Prints { edit, pixel, values };
         if self.prints.as_ref().is_none_or(|before| before.edit != edit) {
-            self.say(&format!("pixel {},{} prints {} values", pixel[0], pixel[1], prints.values.len()));
+            let count = prints.values.len();
+            let values = if count == 1 { "value" } else { "values" };
+            self.say(&format!("pixel {},{} prints {count} {values}", pixel[0], pixel[1]));
             for (place, value) in &prints.values {
                 self.say(&format!("  {}:{}: {} = {value}", place.file, place.line, place.text));
             }
