@@ -42,7 +42,7 @@ pub struct Pose {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum ToWorker {
     /// Show this.
-    View(View),
+    View(Box<View>),
     /// Render with the SPIR-V that follows.
     Kernel {
         /// Number of the edit that it comes from.
@@ -230,7 +230,7 @@ pub enum Stage {
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum FromPage {
     /// Show this.
-    View(View),
+    View(Box<View>),
     /// A pixel.
     Inspect {
         /// Column.

@@ -198,8 +198,8 @@ impl Session {
             FromPage::View(view) => {
                 // Beyond, exposures are infinite or nothing.
                 let exposure = if view.exposure.is_finite() { view.exposure.clamp(-100.0, 100.0) } else { 0.0 };
-                let before = std::mem::replace(&mut self.view, View { exposure, ..view });
-                self.worker.tell(ToWorker::View(self.view.clone()), Vec::new());
+                let before = std::mem::replace(&mut self.view, View { exposure, ..*view });
+                self.worker.tell(ToWorker::View(Box::new(self.view.clone())), Vec::new());
                 match &self.current {
                     Some(kernel) if kernel.calls.has_pixel && before.debug != self.view.debug => {
                         return self.compile(kernel.edit, Instant::now(), None);

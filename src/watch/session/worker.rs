@@ -77,7 +77,7 @@ impl Session {
             self.say(&format!("{} on {}", ready.scene, ready.device));
         }
         self.ready = Some(ready);
-        self.worker.tell(ToWorker::View(self.view.clone()), Vec::new());
+        self.worker.tell(ToWorker::View(Box::new(self.view.clone())), Vec::new());
         match &self.current {
             Some(kernel) if !variant_changed => {
                 let prints = !kernel.calls.prints.is_empty();

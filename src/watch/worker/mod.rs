@@ -140,7 +140,7 @@ impl Worker {
             Incoming::Closed => Err(Error::Interrupted),
             Incoming::Built(outcome) => self.built(*outcome),
             Incoming::Told(message, bytes) => match message {
-                ToWorker::View(view) => self.change_view(view),
+                ToWorker::View(view) => self.change_view(*view),
                 ToWorker::Kernel { edit, prints } => self.change_kernel(edit, prints, &bytes),
                 ToWorker::Scene { edit } => self.order(edit, true),
                 ToWorker::Hold => {
