@@ -13,7 +13,7 @@ use crate::layout::SliceConstants;
 use crate::prepare::Prepared;
 use crate::{Error, Result};
 
-/// How a [`PathTracer`] is bound, where the device's own choice is not wanted (tests try every form).
+/// How a [`super::PathTracer`] is bound, where the device's own choice is not wanted (tests try every form).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BindingOverride {
     /// Form and log2 of the texels of a chunk.
