@@ -4,6 +4,7 @@
 // ends, so that neighbouring lanes stay busy. A lane that has used up its budget of rays saves its state for the next
 // dispatch: the image does not depend on where it was cut.
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_basic : require
 #if TRACE_BACKEND == 1
 #extension GL_EXT_ray_query : require
 #endif
@@ -19,11 +20,14 @@ layout(local_size_x_id = 0, local_size_y = 1, local_size_z = 1) in;
 #include "include/camera.glsl"
 #include "include/mis.glsl"
 #include "include/surface.glsl"
+#include "include/aov.glsl"
 
 layout(set = 0, binding = 0, std140) uniform RenderConstantsBlock { RenderConstants constants; };
 layout(set = 0, binding = 1, std430) writeonly buffer ResultBlock { BlockResult results[]; };
 #include "include/lane.glsl"
 layout(set = 0, binding = 2, std430) buffer LaneBlock { LaneState lanes[]; };
+layout(set = 0, binding = 5, std430) buffer AovBlock { AovSums block_aovs[]; };
+layout(set = 0, binding = 6, std430) buffer CounterBlock { RayCounters block_counters[]; };
 layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 
 #ifdef DEBUG_PRINTS
@@ -268,6 +272,7 @@ bool shade_surface(inout LaneState lane, Hit hit) {
     float width = HAS_MIP ? cone_width(lane.cone, hit.t) : 0.0;
     Surface surface = surface_at(constants, hit, view, lane.media, width);
     if (HAS_PANES && lane.pane_search != 0u) return passes_pane(lane, surface, hit) || finish_shadow(lane, false);
+    if (HAS_AOVS && lane.bounce == 0u) add_surface_aovs(constants, surface);
     if (HAS_MIP) lane.cone.width = width;
     if (HAS_VOLUME) {
         lane.media = surface.near;
@@ -296,9 +301,17 @@ bool shade(inout LaneState lane, Hit hit) {
     return false;
 }
 
+void count_traced(uvec3 kind) {
+    uint visits = count_ray(kind);
+    if (HAS_COST) aovs.visits = add_count(aovs.visits, visits);
+}
+uvec3 path_ray_kind(LaneState lane) { return lane.bounce == 0u ? RAY_CAMERA : RAY_SCATTERED; }
+
 // The lane's ray has been traced. False if the sample is finished.
 bool advance_path(inout LaneState lane, Hit hit) {
     lane.rays += 1u;
+    if (HAS_STATISTICS) count_shading_vector();
+    if (COUNTS_VISITS) count_traced(is_shadow_ray(lane) ? RAY_SHADOW : path_ray_kind(lane));
     if (!is_shadow_ray(lane)) return shade(lane, hit);
     if (HAS_PANES && lane.ray.any_hit && may_be_pane(hit)) {
         lane.ray.any_hit = false;
@@ -334,18 +347,38 @@ void render_baked(inout LaneState lane, uint ray_limit) {
     while (lane.sample_index < lane.end_sample && lane.rays < ray_limit) {
         lane.rays += 1u;
         Found found = find_nearest(constants, lane.ray);
+        if (HAS_STATISTICS) count_shading_vector();
+        if (COUNTS_VISITS) count_traced(path_ray_kind(lane));
         bool goes_on = false;
         // Behind the one test, the triangle is loaded once for the hit and for shading.
         if (found.slot != NONE) goes_on = shade_surface(lane, found_hit(lane.ray, found));
         else leave_scene(lane);
         if (goes_on && lane.ray.any_hit) {
             lane.rays += 1u;
-            goes_on = finish_shadow(lane, !trace_occluded(constants, lane.ray));
+            bool free = !trace_occluded(constants, lane.ray);
+            if (HAS_STATISTICS) count_shading_vector();
+            if (COUNTS_VISITS) count_traced(RAY_SHADOW);
+            goes_on = finish_shadow(lane, free);
         }
         if (SAMPLE_ENDS(!goes_on)) next_sample(lane);
     }
 }
 #endif
+
+// What the block has so far, if the lane goes on with it.
+void load_extras(uint index) {
+    bool resumes = slice.resume != 0u;
+    if (HAS_AOVS) begin_aovs();
+    if (HAS_AOVS && resumes) aovs = block_aovs[index];
+    if (HAS_STATISTICS) begin_counters();
+    if (HAS_STATISTICS && resumes) counters = block_counters[index];
+    if (COUNTS_VISITS) begin_visits();
+}
+
+void store_extras(uint index) {
+    if (HAS_AOVS) block_aovs[index] = aovs;
+    if (HAS_STATISTICS) block_counters[index] = counters;
+}
 
 void main() {
     uint index = gl_GlobalInvocationID.x;
@@ -359,6 +392,7 @@ void main() {
         if (lane.sample_index < lane.end_sample) start_sample(lane);
     }
     uint ray_limit = lane.rays + slice.ray_budget;
+    if (HAS_EXTRAS) load_extras(index);
 #if TRACE_BACKEND == TRACE_BVH
     if (BAKES_GEOMETRY) render_baked(lane, ray_limit);
     else
@@ -370,4 +404,5 @@ void main() {
     if (slice.prints != 0u) debug_end();
 #endif
     lanes[index] = lane;
+    if (HAS_EXTRAS) store_extras(index);
 }

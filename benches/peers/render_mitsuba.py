@@ -65,25 +65,35 @@ class Mitsuba:
         drjit.set_flag(drjit.JitFlag.KernelHistory, True)
 
     def prepare(self, name, folder, resolution, options):
-        self.neutral, self.folder, self.resolution = SCENES[name](), folder, resolution
+        self.model = options.get("model")
+        self.neutral = None if self.model else SCENES[name]()
+        self.folder, self.resolution = folder, resolution
         self.sampler = options.get("sampler", "multijitter")
 
     def load(self):
-        scene = self.neutral
-        to_world = mi.ScalarTransform4f(scene.camera_to_world() @ numpy.diag([-1, 1, -1, 1]))  # Mitsuba looks down +Z
+        if self.model:
+            from model import Model
+
+            bounces, objects = self.model["max_bounces"], Model(self.model["file"]).objects()
+            camera_to_world, yfov = numpy.array(self.model["camera_to_world"]), self.model["yfov_degrees"]
+            environment = self.model["environment"]
+        else:
+            scene, objects = self.neutral, {}
+            for i, mesh in enumerate(scene.meshes):
+                objects |= placed(i, mesh)
+            bounces, camera_to_world, yfov = scene.max_bounces, scene.camera_to_world(), scene.yfov_degrees
+            environment = scene.environment is not None and f"{self.folder}/{scene.name}.hdr"
+        to_world = mi.ScalarTransform4f(camera_to_world @ numpy.diag([-1, 1, -1, 1]))  # Mitsuba looks down +Z
         film = {"type": "hdrfilm", "width": self.resolution, "height": self.resolution, "rfilter": {"type": "box"},
                 "pixel_format": "rgb", "component_format": "float32"}
-        objects = {"type": "scene", "integrator": {"type": "path", "max_depth": scene.max_bounces + 1,
-                                                   "rr_depth": NO_ROULETTE},
-                   "sensor": {"type": "perspective", "fov": scene.yfov_degrees, "fov_axis": "y", "near_clip": 1e-3,
-                              "to_world": to_world, "film": film,
-                              "sampler": {"type": self.sampler, "sample_count": 1}}}
-        for i, mesh in enumerate(scene.meshes):
-            objects |= placed(i, mesh)
-        if scene.environment is not None:
+        objects |= {"type": "scene", "integrator": {"type": "path", "max_depth": bounces + 1, "rr_depth": NO_ROULETTE},
+                    "sensor": {"type": "perspective", "fov": yfov, "fov_axis": "y", "near_clip": 1e-3,
+                               "to_world": to_world, "film": film,
+                               "sampler": {"type": self.sampler, "sample_count": 1}}}
+        if environment:
             # Sunfleck's u is atan2(z, x)/2π, Mitsuba's atan2(x, −z)/2π: a quarter turn about +Y.
             turn = mi.ScalarTransform4f(numpy.array([[0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]]))
-            objects["environment"] = {"type": "envmap", "filename": f"{self.folder}/{scene.name}.hdr", "to_world": turn}
+            objects["environment"] = {"type": "envmap", "filename": environment, "to_world": turn}
         self.scene = mi.load_dict(objects)
         drjit.sync_thread()
 

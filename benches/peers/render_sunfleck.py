@@ -36,19 +36,22 @@ class Sunfleck:
 
     def prepare(self, name, folder, resolution, options):
         self.folder, self.resolution = Path(folder), resolution
-        self.neutral, self.flags = SCENES[name](), options.get("flags", [])
-        self.file = write_gltf(self.neutral, self.folder)
+        self.name, self.flags, model = name, list(options.get("flags", [])), options.get("model")
+        if model:
+            self.file, environment, bounces = model["file"], model["environment"], model["max_bounces"]
+        else:
+            neutral = SCENES[name]()
+            self.file, bounces = write_gltf(neutral, self.folder), neutral.max_bounces
+            environment = neutral.environment is not None and self.folder / f"{name}.hdr"
+        self.flags += ["--max-bounces", str(bounces)] + (["--env", str(environment)] if environment else [])
 
     def load(self):
         """Nothing is kept between renderings: loading is part of each process, and reported with it."""
 
     def render(self, spp, seed):
-        out = self.folder / f"sunfleck-{self.neutral.name}.exr"
+        out = self.folder / f"sunfleck-{self.name}.exr"
         command = [self.binary, "render", self.file, "-o", out, "--resolution", f"{self.resolution}x{self.resolution}",
-                   "--spp", str(spp), "--seed", str(seed), "--max-bounces", str(self.neutral.max_bounces),
-                   "--json", "--quiet", "--strict", *self.flags]
-        if self.neutral.environment is not None:
-            command += ["--env", self.folder / f"{self.neutral.name}.hdr"]
+                   "--spp", str(spp), "--seed", str(seed), "--json", "--quiet", "--strict", *self.flags]
         before = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, env=self.environment)
         wall = time.perf_counter() - before

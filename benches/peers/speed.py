@@ -12,6 +12,7 @@ import argparse
 import json
 import math
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -26,11 +27,16 @@ def arguments():
     parser.add_argument("--pairs", type=int, default=8, help="renderings of each renderer [8]")
     parser.add_argument("--spp", type=int, default=64, help="samples per pixel; a quarter of it for 2 M triangles [64]")
     parser.add_argument("--resolution", type=int, default=256)
+    parser.add_argument("--model", type=Path, help="a .gltf or .glb file, in place of the scenes; with --env")
+    parser.add_argument("--env", type=Path, help="its environment, .hdr or .exr")
     parser.add_argument("--flags", default="", help="more flags for `sunfleck render`, with spaces")
     parser.add_argument("--least", type=float, help="fail where the upper end of a ratio's interval is below this")
     parser.add_argument("--timeout", type=float, default=240.0)
     parser.add_argument("--out", type=Path, default=HERE.parents[1] / "out" / "speed")
-    return parser.parse_args()
+    chosen = parser.parse_args()
+    if (chosen.model is None) != (chosen.env is None):
+        parser.error("--model and --env go together")
+    return chosen
 
 
 def ratio(pairs) -> dict:
@@ -45,11 +51,38 @@ def ratio(pairs) -> dict:
     return {"ratio": math.exp(mean), "low": math.exp(mean - half), "high": math.exp(mean + half)}
 
 
+def model_options(chosen) -> dict:
+    """The model with the camera that Sunfleck gives it, which stands in its EXR."""
+    import numpy
+    import OpenEXR
+    from render_sunfleck import release_binary
+
+    probe = chosen.out / "camera.exr"
+    subprocess.run([release_binary(), "render", chosen.model, "--resolution", "4x4", "--spp", "1", "--quiet", "-o", probe],
+                   check=True)
+    with OpenEXR.File(str(probe)) as file:
+        # EXR's matrices act on rows; its cameras look down +Z.
+        to_camera, to_ndc = (numpy.array(file.header()[name], float).reshape(4, 4).T for name in ("worldToCamera", "worldToNDC"))
+    camera_to_ndc = to_ndc @ numpy.linalg.inv(to_camera)
+    yfov = 2 * math.degrees(math.atan(-0.5 / camera_to_ndc[1, 1]))
+    return {"file": str(chosen.model.resolve()), "environment": str(chosen.env.resolve()), "max_bounces": 7,
+            "camera_to_world": numpy.linalg.inv(numpy.diag([1, 1, -1, 1]) @ to_camera).tolist(), "yfov_degrees": yfov}
+
+
+def model_triangles(path) -> int:
+    from render_sunfleck import release_binary
+
+    info = subprocess.run([release_binary(), "info", path, "--json"], capture_output=True, text=True, check=True).stdout
+    return json.loads(info)["triangles"]
+
+
 def measure_scene(name, chosen) -> dict:
     from children import Child
     from scenes import SCENES as ALL
 
     options = {"sampler": "independent", "flags": ["--sampler", "independent", *chosen.flags.split()]}
+    if chosen.model:
+        options["model"] = model_options(chosen)
     spp = max(4, chosen.spp // 4) if name == "bumpy_2m" else chosen.spp
     children = {}
     try:
@@ -70,7 +103,8 @@ def measure_scene(name, chosen) -> dict:
             child.close()
     paths = chosen.resolution**2 * spp
     best = {renderer: paths / min(taken) / 1e6 for renderer, taken in seconds.items()}
-    return {"scene": name, "triangles": ALL[name]().triangle_count(), "spp": spp, "seconds": seconds,
+    triangles = model_triangles(chosen.model) if chosen.model else ALL[name]().triangle_count()
+    return {"scene": name, "triangles": triangles, "spp": spp, "seconds": seconds,
             "rays_per_path": rays, "best_million_paths_per_second": best, "versions": versions,
             **ratio(list(zip(seconds["sunfleck"], seconds["mitsuba"])))}
 
@@ -98,7 +132,7 @@ def main() -> int:
         return 4
     chosen.out.mkdir(parents=True, exist_ok=True)
     results = []
-    for name in chosen.scenes.split(","):
+    for name in [chosen.model.stem] if chosen.model else chosen.scenes.split(","):
         try:
             results.append(measure_scene(name, chosen))
         except ChildFailed as error:

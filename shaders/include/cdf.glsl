@@ -25,10 +25,7 @@ float cdf_rest(CdfSample s, uint bits) {
     float cdf_probability_##name(uint first_word, uint index) {                                         \
         return cdf_probability(LOAD1(name, first_word + index + 1u) - LOAD1(name, first_word + index)); \
     }                                                                                                   \
-    CdfSample cdf_sample_##name(uint first_word, uint n, uint bits) {                                   \
-        uint x = bits >> 1u;                                                                            \
-        uint low = 0u;                                                                                  \
-        uint high = n;                                                                                  \
+    CdfSample cdf_search_##name(uint first_word, uint low, uint high, uint x) {                         \
         while (high - low > 1u) {                                                                       \
             uint middle = (low + high) >> 1u;                                                           \
             if (LOAD1(name, first_word + middle) <= x) low = middle; else high = middle;                \
@@ -36,9 +33,25 @@ float cdf_rest(CdfSample s, uint bits) {
         uint start = LOAD1(name, first_word + low);                                                     \
         uint count = LOAD1(name, first_word + low + 1u) - start;                                        \
         return CdfSample(low, cdf_probability(count), x - start, count);                                \
+    }                                                                                                   \
+    CdfSample cdf_sample_##name(uint first_word, uint n, uint bits) {                                   \
+        return cdf_search_##name(first_word, 0u, n, bits >> 1u);                                        \
+    }
+
+// log2 of the buckets of a guide, and the words of a CDF with its guide (src/prepare/cdf.rs).
+uint cdf_guide_bits(uint n) { return uint(max(findMSB(n) - 1, 0)); }
+uint cdf_guided_words(uint n) { return n + 2u + (1u << cdf_guide_bits(n)); }
+
+// The same bin as by cdf_sample, found between the bins with which the number's bucket begins and ends.
+#define DEFINE_GUIDED_CDF(name)                                                                       \
+    CdfSample cdf_sample_guided_##name(uint first_word, uint n, uint bits) {                          \
+        uint x = bits >> 1u;                                                                          \
+        uint guide = first_word + n + 1u + (x >> (31u - cdf_guide_bits(n)));                          \
+        return cdf_search_##name(first_word, LOAD1(name, guide), LOAD1(name, guide + 1u) + 1u, x);    \
     }
 
 DEFINE_CDF(TABLES)
 DEFINE_CDF(ENVIRONMENT)
+DEFINE_GUIDED_CDF(ENVIRONMENT)
 
 #endif

@@ -76,7 +76,7 @@ vec3 environment_radiance(RenderConstants constants, vec3 w) { return environmen
 float environment_pdf(RenderConstants constants, vec3 w) { return environment_radiance_and_pdf(constants, w).w; }
 
 uint environment_row_word(RenderConstants constants, uint row) {
-    return constants.environment_conditional_word + row * (constants.environment_width + 1u);
+    return constants.environment_conditional_word + row * cdf_guided_words(constants.environment_width);
 }
 
 // A point under a texel's tent, along one axis.
@@ -104,8 +104,9 @@ EnvironmentSample environment_sample(RenderConstants constants, uvec4 bits) {
         vec3 w = vec3(horizontal.x, cosine, horizontal.y);
         return EnvironmentSample(w, environment_radiance(constants, w), 0.25 * INV_PI);
     }
-    CdfSample row = cdf_sample_ENVIRONMENT(constants.environment_marginal_word, constants.environment_height, bits.x);
-    CdfSample column = cdf_sample_ENVIRONMENT(environment_row_word(constants, row.index), constants.environment_width, bits.y);
+    CdfSample row = cdf_sample_guided_ENVIRONMENT(constants.environment_marginal_word, constants.environment_height, bits.x);
+    CdfSample column = cdf_sample_guided_ENVIRONMENT(
+        environment_row_word(constants, row.index), constants.environment_width, bits.y);
     TentPoint across = tent_point(column, bits.z);
     TentPoint down = tent_point(row, bits.w);
     vec2 own = vec2(across.own, down.own);

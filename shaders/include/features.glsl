@@ -2,6 +2,7 @@
 // is src/gpu/kernel.rs. The defaults switch everything on.
 #ifndef FEATURES_GLSL
 #define FEATURES_GLSL
+#include "layout.glsl"
 
 layout(constant_id = 2) const uint BSDFS = 0x3fu;
 layout(constant_id = 3) const uint LIGHTS = 0x1fu;
@@ -14,6 +15,8 @@ layout(constant_id = 9) const uint STACK_SIZE = 64u;
 layout(constant_id = 10) const uint SAMPLER = 0u;
 layout(constant_id = 11) const uint LIGHT_CHOICE = 1u;
 layout(constant_id = 12) const uint BAKED = 0u;
+layout(constant_id = 13) const uint AOVS = 0x3fu;
+layout(constant_id = 14) const uint STATISTICS = 1u;
 
 const bool HAS_TEXTURES = (FEATURES & 1u) != 0u;
 const bool HAS_INSTANCES = (FEATURES & 2u) != 0u;
@@ -45,6 +48,15 @@ const bool BAKES_LIGHTS = (BAKED & 4u) != 0u;
 
 #define HAS_BSDF(kind) ((BSDFS & (1u << (kind))) != 0u)
 #define HAS_LIGHT(kind) ((LIGHTS & (1u << (kind))) != 0u)
+#define HAS_AOV(kind) ((AOVS & (1u << (kind))) != 0u)
+
+// What a run keeps besides radiance.
+const bool HAS_AOVS = AOVS != 0u;
+const bool HAS_STATISTICS = STATISTICS != 0u;
+const bool HAS_COST = (AOVS & (1u << AOV_COST)) != 0u;
+// Of names, not of expressions: those glslang would make no constant.
+const bool COUNTS_VISITS = HAS_STATISTICS || HAS_COST;
+const bool HAS_EXTRAS = HAS_STATISTICS || HAS_AOVS;
 
 // Which scattering counts the image adds up.
 const bool ADDS_EMISSION = (INTEGRATOR & 1u) != 0u;

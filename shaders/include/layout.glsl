@@ -68,6 +68,13 @@ const uint PROJECTION_ORTHOGRAPHIC = 1u;
 const uint BLOCK_SAMPLES = 16u;
 const uint DEBUG_RECORDS = 64u;
 
+const uint AOV_ALBEDO = 0u;
+const uint AOV_NORMAL = 1u;
+const uint AOV_DEPTH = 2u;
+const uint AOV_POSITION = 3u;
+const uint AOV_COVERAGE = 4u;
+const uint AOV_COST = 5u;
+
 struct RenderConstants {
     vec3 camera_origin;
     float lens_radius;
@@ -135,6 +142,28 @@ struct BlockResult {
     uint capped;
     uint complete;
     uint samples;
+};
+
+struct AovSums {
+    vec3 albedo;
+    uint hits;
+    vec3 normal;
+    float depth;
+    vec3 position;
+    uint visits;
+};
+
+struct RayCounters {
+    uvec3 rays;
+    uint search_steps;
+    uvec3 nodes;
+    uint search_vectors;
+    uvec3 triangles;
+    uint shading_vectors;
+    uint vector_width;
+    uint unused_0;
+    uint unused_1;
+    uint unused_2;
 };
 
 // Scene-array records, decoded from texels by records.glsl.

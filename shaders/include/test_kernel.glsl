@@ -1,5 +1,6 @@
 // What every kernel of shaders/test/ begins with: the bindings, and `lane` with `inputs` and `outputs`.
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_basic : require
 #if TRACE_BACKEND == 1
 #extension GL_EXT_ray_query : require
 #endif

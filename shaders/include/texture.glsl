@@ -12,27 +12,29 @@ float srgb_to_linear(float x) {
     return x <= 0.04045 ? x * (1.0 / 12.92) : base * base * exp2(0.4 * log2(base));
 }
 
+// `i` is at most one texel outside of [0, 2·size] (mirrored) or [0, size] (else), as texel_coordinate leaves it: so one period
+// more or less is enough, and there is no division, which software devices do lane by lane.
 int wrap_texel(int i, int size, uint mode) {
     if (mode == 2u) return clamp(i, 0, size - 1);
     int period = mode == 1u ? 2 * size : size;
-    int j = i % period;
-    j += j < 0 ? period : 0;
-    return j < size ? j : period - 1 - j;
+    i += i < 0 ? period : 0;
+    i -= i >= period ? period : 0;
+    return i < size ? i : period - 1 - i;
 }
 
 vec4 fetch_texel(TextureHeader header, ivec2 texel) {
     uint x = uint(wrap_texel(texel.x, int(header.width), (header.sampling >> TEXTURE_WRAP_U_SHIFT) & 3u));
     uint y = uint(wrap_texel(texel.y, int(header.height), (header.sampling >> TEXTURE_WRAP_V_SHIFT) & 3u));
     uint index = y * header.width + x;
-    vec4 value;
-    if ((header.sampling & TEXTURE_16_BIT) != 0u) {
-        uint low = LOAD1(TEXELS, header.first_word + 2u * index);
-        uint high = LOAD1(TEXELS, header.first_word + 2u * index + 1u);
-        value = vec4(low & 0xffffu, low >> 16u, high & 0xffffu, high >> 16u) * (1.0 / 65535.0);
-    } else {
-        uint word = LOAD1(TEXELS, header.first_word + index);
-        value = vec4(word & 255u, (word >> 8u) & 255u, (word >> 16u) & 255u, word >> 24u) * (1.0 / 255.0);
-    }
+    // Images begin at whole texels of the array, so both words of a wide texel lie in one.
+    bool wide = (header.sampling & TEXTURE_16_BIT) != 0u;
+    uint word = header.first_word + (wide ? 2u * index : index);
+    uvec4 four = LOAD4(TEXELS, word >> 2u);
+    uvec2 two = (word & 2u) == 0u ? four.xy : four.zw;
+    uint one = (word & 1u) == 0u ? two.x : two.y;
+    uvec4 bits = wide ? uvec4(two.x & 0xffffu, two.x >> 16u, two.y & 0xffffu, two.y >> 16u)
+                      : uvec4(one & 255u, (one >> 8u) & 255u, (one >> 16u) & 255u, one >> 24u);
+    vec4 value = vec4(bits) * (wide ? 1.0 / 65535.0 : 1.0 / 255.0);
     if ((header.sampling & TEXTURE_SRGB) != 0u)
         value.rgb = vec3(srgb_to_linear(value.r), srgb_to_linear(value.g), srgb_to_linear(value.b));
     return value;

@@ -3,6 +3,7 @@
 // src/gpu/specialize/bake.rs replaces the bodies of the functions `baked_*`, which it finds by their names.
 #ifndef TRACE_BAKED_GLSL
 #define TRACE_BAKED_GLSL
+#include "counters.glsl"
 #include "features.glsl"
 #include "records.glsl"
 #include "watertight.glsl"
@@ -61,6 +62,10 @@ uvec2 baked_occluded(const vec3 origin, const vec3 direction, const vec3 row_x, 
 // One more than the largest number of a triangle.
 uint baked_numbers() { return 0u; }
 
+// Triangles that each of the two searches tests.
+uint baked_nearest_tests() { return 0u; }
+uint baked_occluded_tests() { return 0u; }
+
 TriangleMeeting meet_number(Ray ray, RaySpace space, uint number) {
     TriangleVertices vertices = load_triangle(number);
     return meet_triangle(space, ray.origin, vertices.a, vertices.b, vertices.c);
@@ -74,6 +79,7 @@ Found search_numbers(Ray ray) {
     for (uint number = 0u; number < numbers; ++number) {
         // A leaf without a second triangle, and an empty slot, have one there whose determinant is 0.
         bool is_triangle = LOAD4(SLOTS, (number >> 1u) * SLOT_TEXELS + 2u).w < SLOT_NO_LEAF;
+        if (COUNTS_VISITS && is_triangle) tested_triangles += 1u;
         TriangleMeeting meeting = meet_number(ray, space, number);
         bool excluded = number == ray.from.slot || number == ray.towards.slot;
         if (is_triangle && meeting.inside && meeting.determinant != 0.0 && meeting.t > 0.0 && meeting.t < found.t && !excluded)
@@ -83,6 +89,8 @@ Found search_numbers(Ray ray) {
 }
 
 Found find_nearest(RenderConstants constants, Ray ray) {
+    if (HAS_STATISTICS) count_search_step();
+    if (COUNTS_VISITS) tested_triangles += baked_nearest_tests();
     BakedRay b = baked_ray(ray);
     uvec3 found = baked_nearest(ray.origin, ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
                                 ray.from.slot, ray.towards.slot);
@@ -103,6 +111,8 @@ Hit trace_nearest(RenderConstants constants, Ray ray) {
 }
 
 bool trace_occluded(RenderConstants constants, Ray ray) {
+    if (HAS_STATISTICS) count_search_step();
+    if (COUNTS_VISITS) tested_triangles += baked_occluded_tests();
     BakedRay b = baked_ray(ray);
     uvec2 found = baked_occluded(ray.origin, ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
                                  ray.from.slot, ray.towards.slot);

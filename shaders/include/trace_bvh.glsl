@@ -4,6 +4,7 @@
 // list of those children, two bits each below a leading one. The newest entry is `top`; the next four stay in registers
 // (a store at a divergent address costs a branch a lane on software devices), the rest in memory.
 #include "alpha.glsl"
+#include "counters.glsl"
 #include "features.glsl"
 #include "records.glsl"
 #include "trace_baked.glsl"
@@ -229,8 +230,16 @@ void leave_instance(inout Trace trace) {
     trace.top = pop_entry(trace);
 }
 
+// An instance counts as a node.
+void count_slot(bool leaf, uvec4 q0, uvec4 q2) {
+    if (!leaf) visited_nodes += 1u;
+    // Where a leaf holds one triangle, its last vertex is its first.
+    if (leaf) tested_triangles += q0.xyz == q2.yzw ? 1u : 2u;
+}
+
 // Visits one slot.
 void trace_step(inout Trace trace, RenderConstants constants) {
+    if (HAS_STATISTICS) count_search_step();
     uint base = trace.current * SLOT_TEXELS;
     uvec4 q0 = LOAD4(SLOTS, base);
     uvec4 q1 = LOAD4(SLOTS, base + 1u);
@@ -239,6 +248,7 @@ void trace_step(inout Trace trace, RenderConstants constants) {
     bool leaf = q2.w < SLOT_NO_LEAF;
     uint next = NONE;
     uint entry = 0u;
+    if (COUNTS_VISITS) count_slot(leaf, q0, q2);
     if (HAS_INSTANCES && q2.w == SLOT_INSTANCE) {
         enter_instance(trace, constants, q2.y);
         return;
@@ -266,8 +276,9 @@ void trace_step(inout Trace trace, RenderConstants constants) {
     trace.current = next;
 }
 
-// Steps until the next look at which lanes are done; more leave finished lanes idle, fewer test too often.
-const int STEPS_PER_ADVANCE = 10;
+// Steps until the next look at which lanes are done: more leave finished lanes idle, fewer shade for few lanes. Where shading
+// looks up textures, it costs so much more than a step that nearly all lanes should shade together (docs/benchmarks).
+const int STEPS_PER_ADVANCE = HAS_TEXTURES ? 40 : 10;
 
 void trace_advance(inout Trace trace, RenderConstants constants) {
     for (int i = 0; i < STEPS_PER_ADVANCE; ++i) {

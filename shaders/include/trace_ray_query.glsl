@@ -1,6 +1,7 @@
 // The trace interface over VK_KHR_ray_query. Primitive i of a mesh is triangle 2·first + i (those of slots that are
 // no leaves are degenerate); the instance's custom index is ours, or 0xffffff for the baked mesh.
 #include "alpha.glsl"
+#include "counters.glsl"
 #include "features.glsl"
 #include "records.glsl"
 
@@ -43,6 +44,7 @@ bool candidate_hits(RenderConstants constants, uvec2 key, TriangleId triangle, v
 
 void trace_advance(inout Trace trace, RenderConstants constants) {
     if (trace.done) return;
+    if (HAS_STATISTICS) count_search_step();
     uint flags = (HAS_ALPHA ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT) | (trace.ray.any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : 0u);
     rayQueryEXT query;
     rayQueryInitializeEXT(query, top_level, flags, 0xffu, trace.ray.origin, trace.t_min, trace.ray.direction,

@@ -1,9 +1,10 @@
 //! `sunfleck merge`: sample ranges to one image.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
-use sunfleck::film::exr::read_exr;
+use sunfleck::film::exr::{ExrImage, read_exr};
 use sunfleck::film::merge::merge;
 use sunfleck::film::output::{ImageFormat, check_writable};
 use sunfleck::film::png::{tone_map_srgb8, write_png};
@@ -35,6 +36,15 @@ pub(crate) struct MergeArgs {
     tone: ToneArgs,
 }
 
+/// A picture holds radiance alone; what else the parts have is not dropped in silence.
+fn note_layers(image: &ExrImage) {
+    let layers: BTreeSet<&str> = image.channels.iter().filter_map(|c| Some(c.name.rsplit_once('.')?.0)).collect();
+    if !layers.is_empty() {
+        let list: Vec<_> = layers.into_iter().collect();
+        eprintln!("note: layers that are not in a .png: {}; merge to an .exr to keep them", list.join(", "));
+    }
+}
+
 /// Merges the parts.
 pub(crate) fn run(args: &MergeArgs) -> anyhow::Result<()> {
     let format = ImageFormat::of(&args.output)?;
@@ -46,6 +56,7 @@ pub(crate) fn run(args: &MergeArgs) -> anyhow::Result<()> {
     match format {
         ImageFormat::Exr => image.write(&args.output)?,
         ImageFormat::Png => {
+            note_layers(&image);
             let radiance = image.rgb().ok_or_else(|| Error::input(&args.output, "the merged image has no colours"))?;
             let (pixels, _) = tone_map_srgb8(&radiance, args.tone.exposure, args.tone.tonemap);
             write_png(&args.output, image.width, image.height, &pixels)?;

@@ -20,6 +20,7 @@ mod render;
 mod render_args;
 mod render_report;
 mod shaders;
+mod statistics_report;
 mod tone_args;
 mod watch;
 

@@ -12,7 +12,6 @@ use super::render_args::RenderArgs;
 type Entry = (&'static str, fn(&Command) -> bool);
 
 const NOT_BUILT: &[Entry] = &[
-    ("--aov", |c| render(c, |r| !r.aov.is_empty())),
     ("--denoise", |c| render(c, |r| r.denoise)),
     ("--checkpoint", |c| render(c, |r| r.checkpoint.is_some())),
     ("--resume", |c| render(c, |r| r.resume)),

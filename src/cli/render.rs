@@ -7,6 +7,8 @@ use std::time::Instant;
 use anyhow::Context;
 use sunfleck::Error;
 use sunfleck::film::Film;
+use sunfleck::film::aov::Aov;
+use sunfleck::film::aov_picture::aov_picture;
 use sunfleck::film::exr::ExrImage;
 use sunfleck::film::metadata::{Metadata, REC709_CHROMATICITIES, software};
 use sunfleck::film::output::ImageFormat;
@@ -18,6 +20,7 @@ use super::estimator_args::EnvironmentArgs;
 use super::progress::Progress;
 use super::render_args::RenderJob;
 use super::render_report::{print_summary, report};
+use super::statistics_report::print_statistics;
 use super::{interrupt, print_json, print_warnings};
 
 /// Renders the job and writes its images.
@@ -49,6 +52,7 @@ fn finish(job: &RenderJob, scene: &Scene, mut result: RenderResult) -> anyhow::R
     print_warnings(&result.warnings);
     if !job.quiet {
         print_summary(job, &result);
+        result.statistics.iter().for_each(|statistics| print_statistics(&statistics.report()));
     }
     if job.json {
         print_json(&report(job, scene, &result))?;
@@ -94,12 +98,32 @@ fn write_outputs(job: &RenderJob, scene: &Scene, result: &RenderResult) -> sunfl
     let mut outcome = Ok(());
     for (path, format) in &job.outputs {
         let written = match format {
-            ImageFormat::Exr => ExrImage::from_film(&result.film, metadata(job, scene, result)).write(path),
+            ImageFormat::Exr => exr_image(job, scene, result).write(path),
             ImageFormat::Png => write_tone_mapped(path, job, &result.film),
         };
         outcome = outcome.and(written);
     }
+    for (path, aov) in &job.aov_pictures {
+        outcome = outcome.and(write_aov_picture(path, *aov, job.quiet, result));
+    }
     outcome
+}
+
+fn exr_image(job: &RenderJob, scene: &Scene, result: &RenderResult) -> ExrImage {
+    let mut image = ExrImage::from_film(&result.film, metadata(job, scene, result));
+    if let Some(aovs) = &result.aovs {
+        aovs.push_layers(&result.film, &mut image);
+    }
+    image
+}
+
+fn write_aov_picture(path: &Path, aov: Aov, quiet: bool, result: &RenderResult) -> sunfleck::Result<()> {
+    let film = &result.film;
+    let Some(picture) = result.aovs.as_ref().and_then(|aovs| aov_picture(aovs, film, aov)) else { return Ok(()) };
+    if let Some(scale) = picture.scale.filter(|_| !quiet) {
+        eprintln!("note: {}: {scale}", path.display());
+    }
+    write_png(path, film.width(), film.height(), &picture.pixels)
 }
 
 fn write_tone_mapped(path: &Path, job: &RenderJob, film: &Film) -> sunfleck::Result<()> {
@@ -159,6 +183,7 @@ mod tests {
         RenderJob {
             scene: "cornell".to_owned(),
             outputs: vec![(folder.join("a.exr"), ImageFormat::Exr), (folder.join("a.png"), ImageFormat::Png)],
+            aov_pictures: Vec::new(),
             settings: Settings { width: 2, height: 1, seed: 3, ..Settings::default() },
             environment: EnvironmentArgs { file: None, strength: 1.0, rotation_degrees: 0.0 },
             exposure_ev: 0.0,
@@ -174,6 +199,8 @@ mod tests {
         film.add_block(1, [2.0; 3], 1.5, 4);
         RenderResult {
             film,
+            aovs: None,
+            statistics: None,
             stopped_by: StopReason::Samples,
             device_reason: String::new(),
             device: "a device".to_owned(),

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
+use sunfleck::film::aov::Aov;
+use sunfleck::film::aov_picture::picture_path;
 use sunfleck::film::output::{ImageFormat, check_writable};
 use sunfleck::film::tonemap::ToneMap;
 use sunfleck::render::{PixelFilter, Settings};
@@ -22,6 +24,7 @@ Examples:
   sunfleck render scene.glb --time 30s --resolution 1920x1080 --json
   sunfleck render scene.obj --env sky.hdr --env-rotation 90 --exposure -1
   sunfleck render scene.gltf --samples 0..64 -o part0.exr     one part of a farm's work
+  sunfleck render scene.gltf -o a.exr --aov albedo,normal     what a denoiser wants besides
   sunfleck render --device 1 --trace bvh --seed 7";
 
 /// Render a scene to EXR and PNG images.
@@ -47,9 +50,10 @@ pub(crate) struct RenderArgs {
     /// Pixel filter.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<PixelFilter>(PixelFilter::NAMES), help_heading = "Image")]
     pub(super) filter: PixelFilter,
-    /// More layers in .exr outputs, such as albedo,normal,depth.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "Image")]
-    pub(super) aov: Vec<String>,
+    /// More layers, as in albedo,normal,depth: means over the samples of what the camera's rays meet first (cost: of what all
+    /// rays of a sample visit). A .exr has them as layers, beside a .png stands a picture of each, NAME.albedo.png.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::named::<Aov>(Aov::NAMES), help_heading = "Image")]
+    aov: Vec<Aov>,
     /// Denoise the image.
     #[arg(long, help_heading = "Image")]
     pub(super) denoise: bool,
@@ -80,6 +84,10 @@ pub(crate) struct RenderArgs {
     /// Estimate the error of the image from replicates, with an interval for it; needs 32 samples per pixel or more.
     #[arg(long, help_heading = "Reports")]
     estimate: bool,
+    /// Count rays by kind, the nodes and triangles that each visits, how full the device's vectors are, and the time of
+    /// slices: a table, and an object in --json. Slows the render down a little.
+    #[arg(long, help_heading = "Reports")]
+    stats: bool,
     /// Print one JSON object about the run on standard output.
     #[arg(long, help_heading = "Reports")]
     json: bool,
@@ -91,6 +99,9 @@ pub(crate) struct RenderArgs {
     strict: bool,
 }
 
+/// Images to write and their formats.
+type Outputs = Vec<(PathBuf, ImageFormat)>;
+
 /// A render with everything about it that is not the scene's.
 #[derive(Clone, Debug)]
 pub(crate) struct RenderJob {
@@ -98,6 +109,8 @@ pub(crate) struct RenderJob {
     pub(crate) scene: String,
     /// Images to write, each with a known format and checked to be writable.
     pub(crate) outputs: Vec<(PathBuf, ImageFormat)>,
+    /// Pictures of AOVs to write beside the .png outputs, checked likewise.
+    pub(crate) aov_pictures: Vec<(PathBuf, Aov)>,
     /// What the library needs to know.
     pub(crate) settings: Settings,
     /// Changes to the scene's environment.
@@ -126,7 +139,8 @@ impl RenderArgs {
 
     /// The job, after every check that needs neither the scene nor a device.
     pub(crate) fn resolve(self) -> Result<RenderJob> {
-        let outputs = self.checked_outputs()?;
+        let aovs: Vec<Aov> = Aov::ALL.iter().copied().filter(|aov| self.aov.contains(aov)).collect();
+        let (outputs, aov_pictures) = self.checked_outputs(&aovs)?;
         let (width, height) = self.resolution;
         let without_limit =
             if self.time.is_some() || self.target_error.is_some() { u32::MAX } else { Settings::default().spp };
@@ -139,6 +153,8 @@ impl RenderArgs {
             estimate: self.estimate,
             sample_range: self.samples,
             filter: self.filter,
+            aovs,
+            statistics: self.stats,
             camera: self.camera,
             strict: self.strict,
             ..Settings::default()
@@ -147,6 +163,7 @@ impl RenderArgs {
         Ok(RenderJob {
             scene: self.scene,
             outputs,
+            aov_pictures,
             settings,
             environment,
             exposure_ev: self.tone.exposure,
@@ -156,10 +173,10 @@ impl RenderArgs {
         })
     }
 
-    /// The outputs with their formats: usage errors first, then what the file system says.
-    fn checked_outputs(&self) -> Result<Vec<(PathBuf, ImageFormat)>> {
+    /// The outputs with their formats, and the pictures of AOVs: usage errors first, then what the file system says.
+    fn checked_outputs(&self, aovs: &[Aov]) -> Result<(Outputs, Vec<(PathBuf, Aov)>)> {
         let named = if self.outputs.is_empty() { default_outputs(&self.scene) } else { self.outputs.clone() };
-        let mut outputs: Vec<(PathBuf, ImageFormat)> = Vec::new();
+        let mut outputs = Outputs::new();
         for path in named {
             let format = ImageFormat::of(&path)?;
             if outputs.iter().any(|(other, _)| *other == path) {
@@ -167,10 +184,21 @@ impl RenderArgs {
             }
             outputs.push((path, format));
         }
-        for (path, _) in &outputs {
+        let pictures: Vec<_> = outputs
+            .iter()
+            .filter(|(_, format)| *format == ImageFormat::Png)
+            .flat_map(|(path, _)| aovs.iter().map(|&aov| (picture_path(path, aov), aov)))
+            .collect();
+        if let Some((path, aov)) = pictures.iter().find(|(path, _)| outputs.iter().any(|(other, _)| other == path)) {
+            return Err(Error::Usage(format!(
+                "output '{}' is also the picture of --aov {aov}; give one of them another name",
+                path.display()
+            )));
+        }
+        for path in outputs.iter().map(|(path, _)| path).chain(pictures.iter().map(|(path, _)| path)) {
             check_writable(path)?;
         }
-        Ok(outputs)
+        Ok((outputs, pictures))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use sunfleck::film::replicates::CONFIDENCE;
-use sunfleck::render::{RenderResult, SamplerKind, StopReason};
+use sunfleck::render::{RenderResult, SamplerKind, Statistics, StopReason};
 use sunfleck::scene::Scene;
 
 use super::progress::{time, with_prefix};
@@ -13,8 +13,11 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
     let rate = |count: u64| count as f64 / result.seconds.render.max(1e-9);
     let warnings = [scene.warnings.as_slice(), result.warnings.as_slice()].concat();
     let samples = job.settings.samples_in(&result.film);
-    let outputs: Vec<_> = job.outputs.iter().map(|(path, _)| path.display().to_string()).collect();
-    json!({
+    let pictures = job.aov_pictures.iter().map(|(path, _)| path);
+    let outputs: Vec<_> =
+        job.outputs.iter().map(|(path, _)| path).chain(pictures).map(|path| path.display().to_string()).collect();
+    let aovs: Vec<_> = job.settings.aovs.iter().map(|aov| aov.name()).collect();
+    let mut object = json!({
         "scene": job.scene,
         "device": result.device,
         "driver": result.driver,
@@ -56,7 +59,10 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "notes": scene.notes,
         "warnings": warnings,
         "outputs": outputs,
-    })
+    });
+    object["aovs"] = json!(aovs);
+    object["statistics"] = json!(result.statistics.as_ref().map(Statistics::report));
+    object
 }
 
 /// From the replicates where they were asked for, else from the variance of the samples: see [`is_upper_bound`].
@@ -117,7 +123,7 @@ pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
             eprintln!("  pixel ({}, {}), sample {}", s.x, s.y, s.sample);
         }
     }
-    for (path, _) in &job.outputs {
+    for path in job.outputs.iter().map(|(path, _)| path).chain(job.aov_pictures.iter().map(|(path, _)| path)) {
         eprintln!("  {}", path.display());
     }
 }

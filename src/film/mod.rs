@@ -2,6 +2,8 @@
 //!
 //! It knows nothing of the GPU and nothing of scenes. Pixels are stored row by row from the top left.
 
+pub mod aov;
+pub mod aov_picture;
 pub mod exr;
 pub mod merge;
 pub mod metadata;

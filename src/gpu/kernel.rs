@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::specialize::specialize;
+use super::specialize::{declared_bindings, specialize};
 use super::{AccelerationStructures, Buffer, Gpu, GpuError, GpuResult};
 
 /// How the shader traces rays (macro TRACE_BACKEND).
@@ -97,8 +97,9 @@ pub struct KernelDescription<'a> {
     pub driver_specializes: bool,
     /// Bytes of push constants.
     pub push_constant_bytes: u32,
-    /// For each set of resources, the bindings 0, 1, 2, …: all sets have the same types.
-    pub sets: &'a [&'a [BindingResource<'a>]],
+    /// For each set of resources, what is bound at which number: all sets have the same numbers and types. What the
+    /// shader, as specialised, does not declare is not bound.
+    pub sets: &'a [&'a [(u32, BindingResource<'a>)]],
 }
 
 /// A pipeline with its sets of resources.
@@ -120,7 +121,7 @@ impl Kernel {
     ///
     /// # Errors
     /// When the driver refuses the shader or memory runs out.
-    pub fn new(gpu: &Arc<Gpu>, description: &KernelDescription<'_>) -> GpuResult<Self> {
+    pub fn new<'a>(gpu: &Arc<Gpu>, description: &KernelDescription<'a>) -> GpuResult<Self> {
         // Owned from the start, so that an error on the way frees what was made (null handles are ignored by Vulkan).
         let mut kernel = Self {
             name: description.name.to_owned(),
@@ -132,20 +133,33 @@ impl Kernel {
             pool: vk::DescriptorPool::null(),
             gpu: gpu.clone(),
         };
-        kernel.create_layouts(description)?;
-        kernel.create_pipeline(description)?;
-        kernel.create_sets(description)?;
+        let mut constants = vec![(0, description.workgroup_size)];
+        constants.extend_from_slice(description.constants);
+        let specialized = if description.driver_specializes { None } else { specialize(description.spirv, &constants) };
+        let spirv = specialized.as_deref().unwrap_or(description.spirv);
+        let declared = declared_bindings(spirv);
+        let is_bound = |number: u32| declared.as_ref().is_none_or(|declared| declared.contains(&number));
+        let bound = |set: &&[(u32, BindingResource<'a>)]| -> Vec<_> {
+            set.iter().filter(|(number, _)| is_bound(*number)).copied().collect()
+        };
+        let sets: Vec<_> = description.sets.iter().map(bound).collect();
+        kernel.create_layouts(description, &sets[0])?;
+        kernel.create_pipeline(spirv, &constants)?;
+        kernel.create_sets(&sets)?;
         Ok(kernel)
     }
 
-    fn create_layouts(&mut self, description: &KernelDescription<'_>) -> GpuResult<()> {
+    fn create_layouts(
+        &mut self,
+        description: &KernelDescription<'_>,
+        set: &[(u32, BindingResource<'_>)],
+    ) -> GpuResult<()> {
         let device = &self.gpu.device;
-        let bindings: Vec<_> = description.sets[0]
+        let bindings: Vec<_> = set
             .iter()
-            .zip(0..)
-            .map(|(resource, binding)| {
+            .map(|(binding, resource)| {
                 vk::DescriptorSetLayoutBinding::default()
-                    .binding(binding)
+                    .binding(*binding)
                     .descriptor_type(resource.descriptor_type())
                     .descriptor_count(resource.count())
                     .stage_flags(vk::ShaderStageFlags::COMPUTE)
@@ -172,10 +186,8 @@ impl Kernel {
         Ok(())
     }
 
-    fn create_pipeline(&mut self, description: &KernelDescription<'_>) -> GpuResult<()> {
+    fn create_pipeline(&mut self, spirv: &[u32], constants: &[(u32, u32)]) -> GpuResult<()> {
         let device = &self.gpu.device;
-        let mut constants = vec![(0, description.workgroup_size)];
-        constants.extend_from_slice(description.constants);
         let entries: Vec<_> = constants
             .iter()
             .zip(0u32..)
@@ -184,9 +196,7 @@ impl Kernel {
         let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
         let specialization =
             vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
-        let specialized = if description.driver_specializes { None } else { specialize(description.spirv, &constants) };
-        let module_info =
-            vk::ShaderModuleCreateInfo::default().code(specialized.as_deref().unwrap_or(description.spirv));
+        let module_info = vk::ShaderModuleCreateInfo::default().code(spirv);
         // SAFETY: the SPIR-V is from our compiler; all pointers outlive the calls; the module may go once the pipeline
         // is made.
         unsafe {
@@ -208,12 +218,14 @@ impl Kernel {
         Ok(())
     }
 
-    fn create_sets(&mut self, description: &KernelDescription<'_>) -> GpuResult<()> {
+    fn create_sets(&mut self, sets: &[Vec<(u32, BindingResource<'_>)>]) -> GpuResult<()> {
         let device = &self.gpu.device;
-        let set_count = u32::try_from(description.sets.len()).unwrap_or(u32::MAX);
-        let sizes: Vec<_> = description.sets[0]
+        let set_count = u32::try_from(sets.len()).unwrap_or(u32::MAX);
+        let sizes: Vec<_> = sets[0]
             .iter()
-            .map(|r| vk::DescriptorPoolSize::default().ty(r.descriptor_type()).descriptor_count(r.count() * set_count))
+            .map(|(_, r)| {
+                vk::DescriptorPoolSize::default().ty(r.descriptor_type()).descriptor_count(r.count() * set_count)
+            })
             .collect();
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(set_count).pool_sizes(&sizes);
         // SAFETY: the device is alive; the pool is sized for exactly these sets.
@@ -221,15 +233,15 @@ impl Kernel {
             self.pool = device
                 .create_descriptor_pool(&info, None)
                 .map_err(GpuError::call("vkCreateDescriptorPool", &self.name))?;
-            let layouts = vec![self.set_layout; description.sets.len()];
+            let layouts = vec![self.set_layout; sets.len()];
             let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
             self.sets = device
                 .allocate_descriptor_sets(&info)
                 .map_err(GpuError::call("vkAllocateDescriptorSets", &self.name))?;
         }
-        for (set, resources) in self.sets.iter().zip(description.sets) {
-            for (resource, binding) in resources.iter().zip(0..) {
-                self.write_binding(*set, binding, *resource);
+        for (set, resources) in self.sets.iter().zip(sets) {
+            for (binding, resource) in resources {
+                self.write_binding(*set, *binding, *resource);
             }
         }
         Ok(())

@@ -36,6 +36,34 @@ pub fn build(weights: &[f64]) -> Vec<u32> {
     cdf
 }
 
+/// log2 of the buckets of a guide for so many bins: two to four bins a bucket, were they alike.
+fn guide_bits(bins: usize) -> u32 {
+    bins.max(1).ilog2().saturating_sub(1)
+}
+
+/// Words of [`guide`] for so many bins.
+pub fn guide_words(bins: usize) -> usize {
+    (1 << guide_bits(bins)) + 1
+}
+
+/// The bin of the first count of each of 2ᵇ equal buckets of the counts, and the last bin: where the search for a count in
+/// bucket g begins and, by the next entry, ends (Chen and Asau 1974, "On generating random variates from an empirical
+/// distribution"). The bin that is found is that of a search through all.
+pub fn guide(cdf: &[u32]) -> Vec<u32> {
+    let bins = cdf.len() - 1;
+    let bits = guide_bits(bins);
+    let mut bin = 0;
+    (0..=1_u64 << bits)
+        .map(|bucket| {
+            let first = (bucket << (CDF_TOTAL.ilog2() - bits)).min(u64::from(CDF_TOTAL) - 1);
+            while bin + 1 < bins && u64::from(cdf[bin + 1]) <= first {
+                bin += 1;
+            }
+            bin as u32
+        })
+        .collect()
+}
+
 /// Number of counts of a bin.
 pub fn count(cdf: &[u32], bin: usize) -> u32 {
     cdf[bin + 1] - cdf[bin]

@@ -5,8 +5,8 @@
 //! the tent: the density of (u, v) is then the interpolated probability.
 //!
 //! The array holds the texels as (r, g, b, p), row by row from the top, p the probability of picking the texel times
-//! width·height/2π² (0 if texels are not picked), then in words the marginal CDF over rows (`height + 1`) and one
-//! conditional CDF a row (`width + 1` each).
+//! width·height/2π² (0 if texels are not picked), then in words the marginal CDF over rows (`height + 1`) with its guide, and
+//! a conditional CDF (`width + 1`) with its guide for each row.
 
 use std::f64::consts::{PI, TAU};
 
@@ -91,7 +91,7 @@ fn image(
     sampling: EnvironmentSampling,
 ) -> Result<PreparedEnvironment, PrepareError> {
     let texel_words = 4 * u64::from(width) * u64::from(height);
-    let cdf_words = u64::from(height) + 1 + u64::from(height) * (u64::from(width) + 1);
+    let cdf_words = guided_words(height) + u64::from(height) * guided_words(width);
     if texel_words + cdf_words + 3 > u64::from(u32::MAX) {
         return Err(PrepareError::EnvironmentTooLarge { width, height });
     }
@@ -108,11 +108,16 @@ fn image(
     };
     if sampling == EnvironmentSampling::Importance {
         prepared.marginal_word = texel_words as u32;
-        prepared.conditional_word = prepared.marginal_word + height + 1;
+        prepared.conditional_word = prepared.marginal_word + guided_words(height) as u32;
         prepared.array.extend(super::pack_words(&tents.cdf_words()));
         prepared.store_probabilities();
     }
     Ok(prepared)
+}
+
+/// Words of a CDF over so many bins and of its guide.
+fn guided_words(bins: u32) -> u64 {
+    u64::from(bins) + 1 + cdf::guide_words(bins as usize) as u64
 }
 
 /// What the texels' tents hold: luminance times the integral of the tent and sin θ.
@@ -138,15 +143,20 @@ impl<'a> Tents<'a> {
         self.rows.iter().sum::<f64>() * PI / (2.0 * (self.width * self.height) as f64)
     }
 
-    /// The marginal CDF, then the conditional ones.
+    /// The marginal CDF, then the conditional ones, each with its guide.
     fn cdf_words(&self) -> Vec<u32> {
-        let mut words = cdf::build(&self.rows);
-        words.reserve_exact(self.height * (self.width + 1));
+        let mut words = Vec::new();
+        let mut add = |weights: &[f64]| {
+            let cdf = cdf::build(weights);
+            words.extend_from_slice(&cdf);
+            words.extend(cdf::guide(&cdf));
+        };
+        add(&self.rows);
         let mut weights = Vec::with_capacity(self.width);
         for row in self.texels.chunks_exact(self.width) {
             weights.clear();
             weights.extend(row.iter().map(|t| luminance(*t)));
-            words.extend(cdf::build(&weights));
+            add(&weights);
         }
         words
     }
@@ -198,12 +208,20 @@ impl PreparedEnvironment {
         probability * (width * height) as f64 / (2.0 * PI * PI * (v * PI).sin())
     }
 
+    /// The CDF over rows, `height + 1` words.
+    pub fn marginal(&self) -> &[u32] {
+        &self.words()[self.marginal_word as usize..][..self.height as usize + 1]
+    }
+
+    /// The CDF over the texels of a row, `width + 1` words.
+    pub fn conditional(&self, row: usize) -> &[u32] {
+        let first = self.conditional_word as usize + row * guided_words(self.width) as usize;
+        &self.words()[first..][..self.width as usize + 1]
+    }
+
     /// Probability of picking a texel.
     pub fn texel_probability(&self, x: usize, y: usize) -> f64 {
-        let words = self.words();
-        let marginal = &words[self.marginal_word as usize..];
-        let conditional = &words[self.conditional_word as usize + y * (self.width as usize + 1)..];
-        cdf::probability(marginal, y) * cdf::probability(conditional, x)
+        cdf::probability(self.marginal(), y) * cdf::probability(self.conditional(y), x)
     }
 }
 

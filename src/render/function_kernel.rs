@@ -53,12 +53,12 @@ impl FunctionCall<'_> {
         let arrays = buffers.bindings();
         let array_binding = array_binding(&buffers, form.0, &arrays);
         let mut set = vec![
-            BindingResource::Uniform(&constants),
-            BindingResource::Storage(&input),
-            BindingResource::Storage(&output),
-            array_binding,
+            (0, BindingResource::Uniform(&constants)),
+            (1, BindingResource::Storage(&input)),
+            (2, BindingResource::Storage(&output)),
+            (3, array_binding),
         ];
-        set.extend(buffers.acceleration.as_ref().map(BindingResource::AccelerationStructure));
+        set.extend(buffers.acceleration.as_ref().map(|a| (4, BindingResource::AccelerationStructure(a))));
         let mut specialization = vec![(1, form.1), (12, baked.parts)];
         specialization.extend_from_slice(self.specialization);
         let kernel = Kernel::new(

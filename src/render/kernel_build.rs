@@ -8,7 +8,10 @@ use super::kernel_key::KernelKey;
 use super::scene_buffers::{SceneBuffers, array_binding};
 use super::slices::Slice;
 use super::{Integrator, Settings};
-use crate::gpu::{ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, embedded, shader_compiler};
+use crate::film::aov::Aov;
+use crate::gpu::{
+    ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, TraceBackend, embedded, shader_compiler,
+};
 use crate::layout::SliceConstants;
 use crate::prepare::Prepared;
 use crate::{Error, Result};
@@ -28,6 +31,16 @@ pub struct BindingOverride {
     pub slice_time: Option<Duration>,
     /// The driver puts in the specialisation constants, not [`crate::gpu::specialize`].
     pub driver_specializes: bool,
+}
+
+/// A driver does not say what its ray queries visit.
+pub(super) fn check_aovs(aovs: &[Aov], trace: TraceBackend) -> Result<()> {
+    if aovs.contains(&Aov::Cost) && trace == TraceBackend::RayQuery {
+        return Err(Error::Usage(String::from(
+            "--aov cost: nobody can tell what ray queries visit; add --trace bvh, or leave cost out",
+        )));
+    }
+    Ok(())
 }
 
 /// An integrator that adds nothing behind the first scattering events need not look there.
@@ -65,20 +78,23 @@ pub(super) fn build_kernel(
 ) -> Result<Kernel> {
     let arrays = buffers.bindings();
     let array_binding = array_binding(buffers, key.array_form, &arrays);
-    let sets: Vec<Vec<BindingResource<'_>>> = slices
+    let sets: Vec<Vec<(u32, BindingResource<'_>)>> = slices
         .iter()
         .map(|slice| {
+            // What the kernel does not keep it does not declare, unless the driver specialises it: then it does not use it.
             let mut set = vec![
-                BindingResource::Uniform(constants),
-                BindingResource::Storage(&slice.results),
-                BindingResource::Storage(&slice.lane_states),
-                array_binding,
+                (0, BindingResource::Uniform(constants)),
+                (1, BindingResource::Storage(&slice.results)),
+                (2, BindingResource::Storage(&slice.lane_states)),
+                (3, array_binding),
             ];
-            set.extend(buffers.acceleration.as_ref().map(BindingResource::AccelerationStructure));
+            set.extend(buffers.acceleration.as_ref().map(|a| (4, BindingResource::AccelerationStructure(a))));
+            set.push((5, BindingResource::Storage(slice.aovs.as_ref().unwrap_or(&slice.results))));
+            set.push((6, BindingResource::Storage(slice.counters.as_ref().unwrap_or(&slice.results))));
             set
         })
         .collect();
-    let sets: Vec<&[BindingResource<'_>]> = sets.iter().map(Vec::as_slice).collect();
+    let sets: Vec<&[(u32, BindingResource<'_>)]> = sets.iter().map(Vec::as_slice).collect();
     let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
     Ok(Kernel::new(
         gpu,

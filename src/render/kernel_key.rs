@@ -4,7 +4,9 @@ use std::fmt;
 
 use super::bake::Baked;
 use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings};
+use crate::film::aov::Aov;
 use crate::gpu::{ArrayForm, TraceBackend};
+use crate::layout::{AOV_ALBEDO, AOV_COST, AOV_COVERAGE, AOV_DEPTH, AOV_NORMAL, AOV_POSITION};
 use crate::prepare::{EnvironmentKind, Features, LightChoice, Prepared};
 use crate::scene::{Camera, Projection};
 
@@ -44,6 +46,21 @@ pub struct KernelKey {
     pub baked: Baked,
     /// How environment directions are drawn.
     pub env_sampling: EnvironmentSampling,
+    /// Bit `1 << AOV_*` for each AOV that is summed.
+    pub aovs: u32,
+    /// Rays and their searches are counted.
+    pub statistics: bool,
+}
+
+fn aov_bit(aov: Aov) -> u32 {
+    1 << match aov {
+        Aov::Albedo => AOV_ALBEDO,
+        Aov::Normal => AOV_NORMAL,
+        Aov::Depth => AOV_DEPTH,
+        Aov::Position => AOV_POSITION,
+        Aov::Coverage => AOV_COVERAGE,
+        Aov::Cost => AOV_COST,
+    }
 }
 
 impl KernelKey {
@@ -72,7 +89,21 @@ impl KernelKey {
             replicates: settings.sampler == SamplerKind::Sobol && settings.estimates_error(),
             baked: Baked::default(),
             env_sampling: settings.env_sampling,
+            aovs: settings.aovs.iter().fold(0, |bits, &aov| bits | aov_bit(aov)),
+            statistics: settings.statistics,
         }
+    }
+
+    /// The AOVs that are summed.
+    pub fn aovs(&self) -> Vec<Aov> {
+        Aov::ALL.iter().copied().filter(|&aov| self.aovs & aov_bit(aov) != 0).collect()
+    }
+
+    /// Names of what the kernel has: the scene's features, then what the settings ask for besides.
+    pub fn kept(&self) -> Vec<String> {
+        let features = self.features.kept().into_iter().map(str::to_owned);
+        let aovs = self.aovs().into_iter().map(|aov| format!("aov-{aov}"));
+        features.chain(aovs).chain(self.statistics.then(|| String::from("statistics"))).collect()
     }
 
     /// The specialisation constants of shaders/include/features.glsl.
@@ -119,6 +150,8 @@ impl KernelKey {
             (10, self.sampler as u32 + u32::from(self.replicates)),
             (11, u32::from(f.light_choice == LightChoice::Bvh)),
             (12, self.baked.parts),
+            (13, self.aovs),
+            (14, self.statistics.into()),
         ]
     }
 }
@@ -132,7 +165,7 @@ impl fmt::Display for KernelKey {
         )?;
         write!(f, " {} {} {} {}", self.integrator, self.light_sampling, self.mis_heuristic, self.env_sampling)?;
         write!(f, " lights:{}", self.features.light_choice)?;
-        write!(f, " [{}]", self.features.kept().join(" "))?;
+        write!(f, " [{}]", self.kept().join(" "))?;
         if self.sampler != SamplerKind::Independent {
             write!(f, " {}{}", self.sampler, if self.replicates { ":replicates" } else { "" })?;
         }

@@ -16,6 +16,7 @@ mod scene_buffers;
 mod schedule;
 mod settings;
 mod slices;
+mod statistics;
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -36,6 +37,7 @@ pub use settings::{
     DeviceChoice, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings, TraceChoice,
     choose_camera,
 };
+pub use statistics::{Occupancy, RayCount, RayReport, SliceReport, Statistics, StatisticsReport};
 
 use crate::film::metadata::{world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective};
 use crate::film::replicates::ReplicateSums;
@@ -111,6 +113,10 @@ pub fn render_on(
     if let Some(most) = settings.clamp_indirect {
         warnings.push(format!("biased: indirect light above {most} is cut off, the image is too dark where it was"));
     }
+    if run.statistics.as_ref().is_some_and(|statistics| statistics.is_saturated) || run.saturated_costs > 0 {
+        warnings
+            .push(String::from("a counter stopped at 4294967295 within a block of 16 samples: there were more visits"));
+    }
     let error_estimate = run.replicates.as_ref().and_then(ReplicateSums::estimate);
     if run.replicates.is_some() && error_estimate.is_none() {
         warnings.push(String::from(
@@ -131,7 +137,7 @@ pub fn render_on(
         kernel_key: key.to_string(),
         light_choice: key.features.light_choice,
         baked: tracer.bake_report().clone(),
-        features: key.features.kept().into_iter().map(str::to_owned).collect(),
+        features: key.kept(),
         rays: run.rays,
         paths: run.paths,
         seconds: Seconds {
@@ -146,6 +152,8 @@ pub fn render_on(
         non_finite_samples: run.non_finite_samples,
         first_non_finite: run.first_non_finite,
         film: run.film,
+        aovs: run.aovs,
+        statistics: run.statistics,
         world_to_camera: world_to_camera(camera.camera_to_world),
         world_to_ndc: match camera.projection {
             Projection::Perspective { yfov_radians } => {

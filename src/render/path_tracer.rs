@@ -9,9 +9,10 @@ use ash::vk::BufferUsageFlags as Usage;
 use glam::DVec3;
 
 use super::bake::BakeReport;
-use super::kernel_build::{BindingOverride, baked_spirv, build_kernel, effective_max_bounces};
+use super::kernel_build::{BindingOverride, baked_spirv, build_kernel, check_aovs, effective_max_bounces};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
+use super::run::{Limits, SliceResults};
 use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
@@ -28,6 +29,8 @@ pub struct PathTracer {
     key: KernelKey,
     pub(super) kernel: Kernel,
     pub(super) constants: RenderConstants,
+    /// Where rebased space has its zero.
+    origin: DVec3,
     pub(super) constants_buffer: Buffer,
     pub(super) slices: Vec<Slice>,
     buffers: Arc<SceneBuffers>,
@@ -43,7 +46,8 @@ impl PathTracer {
     /// Uploads the scene and compiles its kernel.
     ///
     /// # Errors
-    /// Out of memory, a shader that does not compile, a limit of the device that the scene does not fit.
+    /// Out of memory, a shader that does not compile, a limit of the device that the scene does not fit; an AOV that the
+    /// back end cannot give.
     pub fn new(
         gpu: &Arc<Gpu>,
         trace: TraceBackend,
@@ -52,6 +56,7 @@ impl PathTracer {
         settings: &Settings,
         overrides: BindingOverride,
     ) -> Result<Self> {
+        check_aovs(&settings.aovs, trace)?;
         let start = Instant::now();
         let lengths: Vec<usize> = prepared.arrays.iter().map(Vec::len).collect();
         let form = match overrides.array_form {
@@ -110,10 +115,10 @@ impl PathTracer {
             MemoryUse::Upload,
         )?;
         let slice_lanes = overrides.slice_lanes.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
-        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes)).collect();
+        let mut key = KernelKey::new(prepared, camera, settings, buffers.trace, buffers.form);
+        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_lanes, &key)).collect();
         let mut slices = slices?;
         let start = Instant::now();
-        let mut key = KernelKey::new(prepared, camera, settings, buffers.trace, buffers.form);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
@@ -122,6 +127,7 @@ impl PathTracer {
             key,
             kernel,
             constants,
+            origin: prepared.origin,
             constants_buffer,
             slices,
             buffers,
@@ -143,7 +149,7 @@ impl PathTracer {
     }
 
     /// Builds the kernel anew, for other settings or shaders, and keeps the scene on the device. `prepared` is the scene
-    /// that was uploaded. On an error the tracer is as it was.
+    /// that was uploaded; AOVs and statistics stay those that it was made for. On an error the tracer is as it was.
     ///
     /// # Errors
     /// A shader that does not compile, a lost device.
@@ -151,6 +157,7 @@ impl PathTracer {
         let start = Instant::now();
         let gpu = &self.buffers.gpu;
         let mut key = self.key_for(prepared, camera, settings);
+        (key.aovs, key.statistics) = (self.key.aovs, self.key.statistics);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
         let kernel =
             build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &self.constants_buffer, &self.slices)?;
@@ -208,7 +215,7 @@ impl PathTracer {
         self.constants.seed = seed;
         let looks = Looks::new(plan.samples.clone(), plan.target_error);
         let mut sizes = SliceSizes::new(self.overrides, self.slices[0].lanes());
-        let mut run = Run::new(&self.constants, plan);
+        let mut run = Run::new(&self.constants, plan, &self.key);
         // An open end is no total.
         let mut expected = (plan.samples.end < u32::MAX).then(|| plan.samples.end - plan.samples.start);
         let (start, mut done, mut end) = (Instant::now(), plan.samples.start, looks.first_end());
@@ -246,6 +253,7 @@ impl PathTracer {
         let mut schedule = Schedule::new(&self.constants);
         let mut in_flight = VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
+        let mut last_end = Instant::now();
         loop {
             if limits.time.is_some_and(|limit| limits.start.elapsed() >= limit) && !schedule.is_done() {
                 run.stop(StopReason::Time);
@@ -258,9 +266,16 @@ impl PathTracer {
             }
             // In the order of submission, so that a pixel's blocks are joined by their index.
             let Some(slot) = in_flight.pop_front() else { return Ok(()) };
-            let outcome = self.slices[slot].finish(&self.kernel, slot)?;
+            let outcome = self.slices[slot].finish(&self.kernel, slot, last_end)?;
+            last_end = Instant::now();
             sizes.observe(&outcome);
-            run.add(&self.constants, &outcome, self.slices[slot].results(outcome.constants.lanes)?);
+            let (slice, lanes) = (&self.slices[slot], outcome.constants.lanes);
+            let brought = SliceResults {
+                results: slice.results(lanes)?,
+                aovs: slice.aovs(lanes)?,
+                counters: slice.counters(lanes)?,
+            };
+            run.add(&self.constants, &outcome, &brought, self.origin);
             free.push(slot);
             let update = ProgressUpdate {
                 samples_done: run.paths,
@@ -277,11 +292,4 @@ impl PathTracer {
     fn total_samples(&self, per_pixel: u32) -> u64 {
         u64::from(per_pixel) * u64::from(self.constants.width) * u64::from(self.constants.height)
     }
-}
-
-/// What ends a range before its samples do, and what its progress is measured by.
-struct Limits {
-    start: Instant,
-    time: Option<Duration>,
-    samples_total: Option<u64>,
 }

@@ -1,5 +1,7 @@
 //! What a kernel prints by DEBUG_PRINT (shaders/include/debug.glsl).
 
+use std::time::Instant;
+
 use super::path_tracer::PathTracer;
 use super::schedule::index_of_pixel;
 use crate::Result;
@@ -33,7 +35,7 @@ impl PathTracer {
             ..SliceConstants::default()
         };
         self.slices[0].submit(&self.kernel, 0, push)?;
-        self.slices[0].finish(&self.kernel, 0)?;
+        self.slices[0].finish(&self.kernel, 0, Instant::now())?;
         let records = self.slices[0].results(2 + DEBUG_RECORDS)?;
         Ok(decode(&records[1..]))
     }

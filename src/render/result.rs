@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use super::BakeReport;
+use super::{BakeReport, Statistics};
 use crate::film::Film;
+use crate::film::aov::AovFilm;
 use crate::film::replicates::{ErrorEstimate, RobustMean};
 use crate::prepare::LightChoice;
 
@@ -12,6 +13,10 @@ use crate::prepare::LightChoice;
 pub struct RenderResult {
     /// The samples.
     pub film: Film,
+    /// What was kept besides radiance, if the settings ask for anything.
+    pub aovs: Option<AovFilm>,
+    /// Counters, if the settings ask for them.
+    pub statistics: Option<Statistics>,
     /// Which rule ended the run.
     pub stopped_by: StopReason,
     /// Name of the device.

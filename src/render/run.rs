@@ -1,14 +1,17 @@
 //! A run of the kernel: what it is to render, and what has come back of it.
 
 use std::ops::Range;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+use glam::{DVec3, Vec3};
 
 use super::schedule::{padded_pixels, pixel_of_index};
 use super::slices::SliceOutcome;
-use super::{NonFiniteSample, Settings, StopReason};
+use super::{KernelKey, NonFiniteSample, Settings, Statistics, StopReason};
 use crate::film::Film;
+use crate::film::aov::{AovFilm, AovSample};
 use crate::film::replicates::ReplicateSums;
-use crate::layout::{BLOCK_SAMPLES, BlockResult, RenderConstants};
+use crate::layout::{AovSums, BLOCK_SAMPLES, BlockResult, RayCounters, RenderConstants};
 
 /// What a run renders and what ends it.
 #[derive(Clone, Debug)]
@@ -40,11 +43,24 @@ impl RunPlan {
     }
 }
 
+/// What ends a range before its samples do, and what its progress is measured by.
+pub(super) struct Limits {
+    pub(super) start: Instant,
+    pub(super) time: Option<Duration>,
+    pub(super) samples_total: Option<u64>,
+}
+
 /// What a run of the kernel returns.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// The samples.
     pub film: Film,
+    /// AOVs, if the kernel sums any.
+    pub aovs: Option<AovFilm>,
+    /// Blocks in which the count behind [`crate::film::aov::Aov::Cost`] stopped at the largest number.
+    pub saturated_costs: u64,
+    /// Counters, if the kernel counts.
+    pub statistics: Option<Statistics>,
     /// Which rule ended it.
     pub stopped_by: StopReason,
     /// The sums of replicates, if they were asked for.
@@ -74,10 +90,14 @@ impl Run {
         }
     }
 
-    pub(super) fn new(constants: &RenderConstants, plan: &RunPlan) -> Self {
+    pub(super) fn new(constants: &RenderConstants, plan: &RunPlan, key: &KernelKey) -> Self {
         let film = Film::new(constants.width, constants.height);
         let replicates = plan.estimates_error();
+        let aovs = key.aovs();
         Self {
+            aovs: (!aovs.is_empty()).then(|| AovFilm::new(&aovs, film.pixels().len())),
+            saturated_costs: 0,
+            statistics: key.statistics.then(|| Statistics::new(key.trace)),
             replicates: replicates.then(|| ReplicateSums::new(film.pixels().len())),
             film,
             stopped_by: StopReason::Samples,
@@ -90,18 +110,32 @@ impl Run {
         }
     }
 
-    pub(super) fn add(&mut self, constants: &RenderConstants, outcome: &SliceOutcome, results: &[BlockResult]) {
+    /// What a slice has brought. `origin` is the world's point at which rebased space has its zero.
+    pub(super) fn add(
+        &mut self,
+        constants: &RenderConstants,
+        outcome: &SliceOutcome,
+        slice: &SliceResults<'_>,
+        origin: DVec3,
+    ) {
         let pixels = padded_pixels(constants);
-        for (result, lane) in results.iter().zip(0_u64..) {
+        if let (Some(statistics), Some(counters)) = (&mut self.statistics, slice.counters) {
+            statistics.add(outcome, counters);
+        }
+        for (lane, result) in slice.results.iter().enumerate() {
             if result.samples == 0 {
                 continue;
             }
-            let atom = u64::from(outcome.constants.first_atom) + lane;
+            let atom = u64::from(outcome.constants.first_atom) + lane as u64;
             let (x, y) = pixel_of_index(constants, atom % pixels);
             let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
             let pixel = y as usize * constants.width as usize + x as usize;
             let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
             self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples);
+            if let (Some(film), Some(aovs)) = (&mut self.aovs, slice.aovs) {
+                film.add_block(pixel, &aov_sample(&aovs[lane], origin));
+                self.saturated_costs += u64::from(aovs[lane].visits == u32::MAX);
+            }
             if let Some(replicates) = &mut self.replicates {
                 replicates.add_block(pixel, block, sum, result.samples);
             }
@@ -115,6 +149,26 @@ impl Run {
                 }
             }
         }
+    }
+}
+
+/// What the lanes of a slice have brought.
+pub(super) struct SliceResults<'a> {
+    pub(super) results: &'a [BlockResult],
+    pub(super) aovs: Option<&'a [AovSums]>,
+    pub(super) counters: Option<&'a [RayCounters]>,
+}
+
+/// The sums of a block, positions in world space.
+fn aov_sample(sums: &AovSums, origin: DVec3) -> AovSample {
+    let hits = f64::from(sums.hits);
+    AovSample {
+        albedo: sums.albedo.map(f64::from),
+        normal: sums.normal.map(f64::from),
+        depth: sums.depth.into(),
+        position: (Vec3::from(sums.position).as_dvec3() + origin * hits).to_array(),
+        hits,
+        visits: sums.visits.into(),
     }
 }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::film::Film;
+use crate::film::aov::Aov;
 use crate::named_enum::named_enum;
 use crate::prepare::{BvhQuality, EnvironmentSampling, LightChoice};
 use crate::scene::Scene;
@@ -51,6 +52,10 @@ pub struct Settings {
     pub env_sampling: EnvironmentSampling,
     /// The pixel filter.
     pub filter: PixelFilter,
+    /// What is kept besides radiance, each once.
+    pub aovs: Vec<Aov>,
+    /// Count rays, what their searches visit, and how full vectors are.
+    pub statistics: bool,
     /// Look textures up in mip chains by ray cones, not in the files' texels alone.
     pub mip: bool,
     /// How good the trees of our own BVH are.
@@ -92,6 +97,8 @@ impl Default for Settings {
             mis_heuristic: MisHeuristic::default(),
             env_sampling: EnvironmentSampling::default(),
             filter: PixelFilter::default(),
+            aovs: Vec::new(),
+            statistics: false,
             mip: true,
             bvh_quality: BvhQuality::default(),
             bake: true,

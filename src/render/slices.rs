@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use ash::vk::BufferUsageFlags as Usage;
 
 use super::kernel_build::BindingOverride;
+use super::kernel_key::KernelKey;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
-use crate::layout::{BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, SliceConstants};
+use crate::layout::{AovSums, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants};
 
 /// Slices that are submitted before the oldest is read.
 pub(super) const SLICES_IN_FLIGHT: usize = 2;
@@ -22,6 +23,10 @@ const FIRST_LANES: u32 = 256;
 pub(super) struct Slice {
     pub(super) results: Buffer,
     pub(super) lane_states: Buffer,
+    /// [`AovSums`] a lane, if the kernel sums AOVs.
+    pub(super) aovs: Option<Buffer>,
+    /// [`RayCounters`] a lane, if it counts.
+    pub(super) counters: Option<Buffer>,
     submission: Submission,
     constants: SliceConstants,
     submitted: Instant,
@@ -32,16 +37,24 @@ pub(super) struct Slice {
 pub(super) struct SliceOutcome {
     pub(super) constants: SliceConstants,
     pub(super) seconds: f64,
+    /// The part of it after the slice before it had ended.
+    pub(super) own_seconds: f64,
+    pub(super) dispatches: u64,
     pub(super) rays: u64,
 }
 
 impl Slice {
-    pub(super) fn new(gpu: &Arc<Gpu>, lanes: u32) -> Result<Self> {
+    pub(super) fn new(gpu: &Arc<Gpu>, lanes: u32, key: &KernelKey) -> Result<Self> {
         let bytes = |each: usize| u64::from(lanes) * each as u64;
+        let readback = |name, lanes: u32, each: usize| {
+            Buffer::new(gpu, name, u64::from(lanes) * each as u64, Usage::STORAGE_BUFFER, MemoryUse::Readback)
+        };
         // Behind the result of the lane that prints there is room for what it prints.
-        let results = u64::from(lanes.max(2 + DEBUG_RECORDS)) * size_of::<BlockResult>() as u64;
+        let results = readback("block results", lanes.max(2 + DEBUG_RECORDS), size_of::<BlockResult>())?;
         Ok(Self {
-            results: Buffer::new(gpu, "block results", results, Usage::STORAGE_BUFFER, MemoryUse::Readback)?,
+            results,
+            aovs: (key.aovs != 0).then(|| readback("AOVs", lanes, size_of::<AovSums>())).transpose()?,
+            counters: key.statistics.then(|| readback("counters", lanes, size_of::<RayCounters>())).transpose()?,
             lane_states: Buffer::new(
                 gpu,
                 "lane states",
@@ -62,7 +75,8 @@ impl Slice {
     }
 
     pub(super) fn bytes(&self) -> u64 {
-        self.results.size + self.lane_states.size
+        let extras = [&self.aovs, &self.counters].into_iter().flatten().map(|buffer| buffer.size).sum::<u64>();
+        self.results.size + self.lane_states.size + extras
     }
 
     pub(super) fn submit(&mut self, kernel: &Kernel, set: usize, constants: SliceConstants) -> Result<()> {
@@ -84,18 +98,35 @@ impl Slice {
         Ok(())
     }
 
-    /// Waits until every lane is done, resuming those that have used up their budget.
-    pub(super) fn finish(&mut self, kernel: &Kernel, set: usize) -> Result<SliceOutcome> {
+    /// Waits until every lane is done, resuming those that have used up their budget. `before` is when the slice before it
+    /// ended.
+    pub(super) fn finish(&mut self, kernel: &Kernel, set: usize, before: Instant) -> Result<SliceOutcome> {
+        let mut dispatches = 1;
         loop {
             self.submission.wait()?;
             if self.results(self.constants.lanes)?.iter().all(|result| result.complete == 1) {
                 break;
             }
             self.constants.resume = 1;
+            dispatches += 1;
             self.dispatch(kernel, set)?;
         }
         let rays = self.results(self.constants.lanes)?.iter().map(|result| u64::from(result.rays)).sum();
-        Ok(SliceOutcome { constants: self.constants, seconds: self.submitted.elapsed().as_secs_f64(), rays })
+        Ok(SliceOutcome {
+            constants: self.constants,
+            seconds: self.submitted.elapsed().as_secs_f64(),
+            own_seconds: self.submitted.max(before).elapsed().as_secs_f64(),
+            dispatches,
+            rays,
+        })
+    }
+
+    pub(super) fn aovs(&self, lanes: u32) -> Result<Option<&[AovSums]>> {
+        Ok(self.aovs.as_ref().map(|buffer| buffer.read(lanes as usize)).transpose()?)
+    }
+
+    pub(super) fn counters(&self, lanes: u32) -> Result<Option<&[RayCounters]>> {
+        Ok(self.counters.as_ref().map(|buffer| buffer.read(lanes as usize)).transpose()?)
     }
 
     pub(super) fn results(&self, lanes: u32) -> Result<&[BlockResult]> {

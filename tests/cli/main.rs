@@ -1,5 +1,6 @@
 //! Tests of the program as people call it.
 
+mod aov;
 mod bench;
 mod devices;
 mod driver_environment;

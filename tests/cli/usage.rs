@@ -55,6 +55,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--trace", "rtx", "auto, ray-query, bvh"),
         ("--bvh-quality", "best", "fast, default, high"),
         ("--filter", "sinc", "box"),
+        ("--aov", "motion", "albedo, normal, depth, position, coverage, cost"),
         ("--shaders", "no-such-folder", "no-such-folder"),
         ("-o", "image.jpg", ".exr"),
         ("-o", "image", ".png"),
@@ -85,7 +86,6 @@ fn what_is_not_built_is_refused_by_name() {
     for (arguments, name) in [
         (&["bench", "--device", "all"] as &[&str], "--device all"),
         (&["watch", "--device", "all"], "--device all"),
-        (&["render", "--aov", "albedo,normal"], "--aov"),
         (&["render", "--denoise"], "--denoise"),
         (&["render", "--checkpoint", "c"], "--checkpoint"),
         (&["render", "--resume"], "--resume"),
@@ -104,7 +104,7 @@ fn help_names_everything_of_the_contract_and_marks_what_is_not_built() {
     assert_eq!(code, 0);
     for flag in
         "--resolution --camera --spp --time --target-error --samples --seed --max-bounces --integrator --sampler \
-        --light-sampling --mis --filter --env --env-strength --env-rotation --env-sampling --aov --denoise --exposure \
+        --light-sampling --mis --filter --env --env-strength --env-rotation --env-sampling --aov --stats --denoise --exposure \
         --tonemap --device --trace --bvh-quality --checkpoint --resume --json --quiet --strict --shaders --estimate --output"
             .split_whitespace()
     {

@@ -173,7 +173,8 @@ fn a_kernel_that_hangs_or_kills_the_device_is_named_and_the_last_good_one_goes_o
     let kernel = shaders.join("path_trace.comp");
     let loop_ends = std::fs::read_to_string(&kernel).unwrap();
     std::fs::write(&kernel, replaced(&loop_ends, "lane.sample_index += 1u;", "")).unwrap();
-    watch.expect(&["the worker has been silent for 20 s while it ran path_trace.comp of edit 1", "with that of edit 0"]);
+    watch
+        .expect(&["the worker has been silent for 20 s while it ran path_trace.comp of edit 1", "with that of edit 0"]);
     std::fs::write(&kernel, &loop_ends).unwrap();
     watch.expect(&["path_trace.comp:", "first image", "64 spp"]);
     let worker = worker_of(watch.child.id()).expect("there is another worker");

@@ -59,7 +59,7 @@ fn printed_values_come_back_with_their_types_and_the_image_stays() {
     let first: Vec<_> = printed.iter().take(6).map(|p| (p.place, p.value.as_str())).collect();
     let values = ["0.5", "(1, 2, 3, -4)", "-7", "(8, 9)", "(true, false, true)", "(1, -2, 3)"];
     assert_eq!(first, (1..).zip(values).collect::<Vec<_>>());
-    assert!(printed.len() % 6 == 0 || printed.len() == 64, "{printed:?}");
+    assert!(printed.len().is_multiple_of(6) || printed.len() == 64, "{printed:?}");
     assert!(printing.prints(1, (0, 0), 0).expect("the device works").is_empty(), "the corner meets nothing");
     let plain = gpu::run(&mut gpu::path_tracer(&scene("cornell"), &settings), 1, 4);
     assert!(plain.film.pixels() == gpu::run(&mut printing, 1, 4).film.pixels());

@@ -283,15 +283,14 @@ fn row_sum(image: &Image, row: usize) -> f64 {
 fn every_bright_texel_can_be_picked() {
     for image in images() {
         let prepared = image.prepared();
-        let words = prepared.array.as_flattened();
-        let marginal = &words[prepared.marginal_word as usize..];
+        let marginal = prepared.marginal();
         let mut bits = Vec::new();
         let mut texels = Vec::new();
         for (y, x) in (0..image.height).flat_map(|y| (0..image.width).map(move |x| (y, x))) {
             let bright = image.texel(x as i64, y as i64).max_element() > 0.0;
             assert_eq!(prepared.texel_probability(x, y) > 0.0, bright, "texel {x}, {y}");
             if bright {
-                let conditional = &words[prepared.conditional_word as usize + y * (image.width + 1)..];
+                let conditional = prepared.conditional(y);
                 bits.push([2 * marginal[y], 2 * conditional[x], 0, 0]);
                 // Twice the total is 2^32.
                 let last = |end: u32| end.wrapping_mul(2).wrapping_sub(1);

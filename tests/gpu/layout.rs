@@ -12,7 +12,7 @@ use spirq::ReflectConfig;
 use spirq::ty::{StructType, Type};
 use spirq::var::Variable;
 use sunfleck::gpu::shader_compiler;
-use sunfleck::layout::{self, BlockResult, RenderConstants, SliceConstants};
+use sunfleck::layout::{self, AovSums, BlockResult, RayCounters, RenderConstants, SliceConstants};
 
 /// Name, offset and type of a field as GLSL has it: an array on the Rust side is one field an element on the other.
 type Field = (String, usize, String);
@@ -28,6 +28,7 @@ macro_rules! rust_fields {
 fn rust_type<T>(value: &T) -> String {
     match type_name_of_val(value) {
         "[f32; 3]" => "vec3<f32>".to_owned(),
+        "[u32; 3]" => "vec3<u32>".to_owned(),
         name => name.to_owned(),
     }
 }
@@ -52,6 +53,8 @@ struct Blocks {
     constants: StructType,
     slice: StructType,
     results: (StructType, usize),
+    aovs: (StructType, usize),
+    counters: (StructType, usize),
     lane_stride: usize,
 }
 
@@ -117,6 +120,8 @@ fn reflect() -> Blocks {
     Blocks {
         constants: only_member(binding(0)),
         results: array_of_structs(binding(1)),
+        aovs: array_of_structs(binding(5)),
+        counters: array_of_structs(binding(6)),
         lane_stride: array_of_structs(binding(2)).1,
         slice: only_member(push.expect("push constants")),
     }
@@ -151,6 +156,16 @@ fn blocks_have_the_same_offsets_on_both_sides() {
     assert_eq!(shader_fields(&blocks.results.0), result);
     assert_eq!(blocks.results.1, size_of::<BlockResult>(), "stride of the results");
     assert_eq!(blocks.lane_stride, layout::LANE_STATE_BYTES, "stride of the lane states");
+
+    let aovs = rust_fields!(AovSums: albedo, hits, normal, depth, position, visits);
+    assert_eq!(shader_fields(&blocks.aovs.0), aovs);
+    assert_eq!(blocks.aovs.1, size_of::<AovSums>(), "stride of the AOVs");
+
+    let mut counters = rust_fields!(RayCounters: rays, search_steps, nodes, search_vectors, triangles, shading_vectors,
+        vector_width, unused);
+    split(&mut counters, "unused", &["_0", "_1", "_2"], "u32");
+    assert_eq!(shader_fields(&blocks.counters.0), counters);
+    assert_eq!(blocks.counters.1, size_of::<RayCounters>(), "stride of the counters");
 }
 
 /// The comparison sees a field that moves.

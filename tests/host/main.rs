@@ -6,6 +6,7 @@ mod common;
 mod bench;
 mod bench_rows;
 mod dielectric_albedo;
+mod film_aovs;
 mod film_images;
 mod film_metrics;
 mod film_sums;

@@ -58,11 +58,10 @@ fn check(environment: &Environment) -> PreparedEnvironment {
     let prepared = prepare(environment, Importance).unwrap();
     assert_eq!(prepared.kind, EnvironmentKind::Image);
     let (width, height) = (prepared.width as usize, prepared.height as usize);
-    let words = prepared.array.as_flattened();
-    let marginal = &words[prepared.marginal_word as usize..][..height + 1];
+    let marginal = prepared.marginal();
     assert_eq!((marginal[0], marginal[height]), (0, CDF_TOTAL));
     for y in 0..height {
-        let row = &words[prepared.conditional_word as usize + y * (width + 1)..][..width + 1];
+        let row = prepared.conditional(y);
         let picked = marginal[y + 1] > marginal[y];
         assert_eq!((row[0], row[width]), (0, if picked { CDF_TOTAL } else { 0 }));
         assert!(row.is_sorted());

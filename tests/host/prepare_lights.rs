@@ -12,6 +12,31 @@ use sunfleck::scene::{
     TextureBinding, Wrap,
 };
 
+#[test]
+fn a_guide_bounds_the_search_for_every_count() {
+    let random = |seed: u64, n: usize| {
+        (0..n as u64).map(|i| ((i * 2_654_435_761 + seed * 40_503) % 1009) as f64 / 1009.0).collect::<Vec<_>>()
+    };
+    let sun = |n: usize| (0..n).map(|i| if i == n / 3 { 1e9 } else { f64::from(u8::from(i % 2 == 0)) }).collect();
+    for weights in
+        [vec![1.0], vec![1.0, 2.0], vec![0.0, 0.0, 1.0], random(1, 5), random(2, 64), random(3, 1000), sun(500)]
+    {
+        let table = cdf::build(&weights);
+        let guide = cdf::guide(&table);
+        assert_eq!(guide.len(), cdf::guide_words(weights.len()));
+        let buckets = guide.len() as u64 - 1;
+        assert!(buckets.is_power_of_two());
+        let shift = CDF_TOTAL.ilog2() - buckets.ilog2();
+        // The first and the last count of each bin and of each bucket.
+        let starts = table.iter().map(|&start| u64::from(start)).chain((0..=buckets).map(|b| b << shift));
+        for x in starts.flat_map(|x| [x, x.saturating_sub(1)]).filter(|&x| x < u64::from(CDF_TOTAL)) {
+            let bin = table[..weights.len()].iter().rposition(|&start| u64::from(start) <= x).unwrap() as u32;
+            let bucket = (x >> shift) as usize;
+            assert!((guide[bucket]..=guide[bucket + 1]).contains(&bin), "{weights:?}: count {x}");
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn a_cdf_is_exact(weights in prop::collection::vec(

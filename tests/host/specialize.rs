@@ -2,7 +2,7 @@
 
 use crate::common::spirv::{assert_valid, bytes, instructions, validator_is_there};
 use sunfleck::gpu::shader_compiler::{Sources, compile};
-use sunfleck::gpu::specialize::specialize;
+use sunfleck::gpu::specialize::{declared_bindings, specialize};
 
 const CONSTANT: u32 = 43;
 const SPEC_CONSTANT_TRUE: u32 = 48;
@@ -19,6 +19,7 @@ const SWITCH: u32 = 251;
 fn module(functions: &str, body: &str, (a, b): (u32, u32)) -> Vec<u32> {
     let source = format!(
         "#version 460
+         #extension GL_KHR_shader_subgroup_basic : require
          layout(local_size_x_id = 0) in;
          layout(constant_id = 1) const uint A = 1u;
          layout(constant_id = 2) const uint B = 1u;
@@ -203,4 +204,28 @@ fn broken_modules_do_no_harm() {
         }
         specialize(&broken, &[]);
     }
+}
+
+/// A binding, a built-in variable and a capability go with the code that needed them.
+#[test]
+fn bindings_and_capabilities_go_with_their_code() {
+    const CAPABILITY: u32 = 17;
+    const GROUP_NON_UNIFORM: u32 = 61;
+    const ELECT: u32 = 333;
+    let needs = |spirv: &[u32]| {
+        instructions(spirv).iter().any(|(opcode, operands)| *opcode == CAPABILITY && operands[0] == GROUP_NON_UNIFORM)
+    };
+    let other = "layout(set = 0, binding = 7, std430) buffer Other { uint more[]; };";
+    for (body, elects) in
+        [("if (A == 1u && subgroupElect()) more[0] = lane;", 1), ("if (A == 1u) more[0] = gl_SubgroupSize;", 0)]
+    {
+        let body = format!("data[0] = lane; {body}");
+        let kept = specialized(other, &body, (1, 1));
+        assert_eq!((declared_bindings(&kept), needs(&kept)), (Some(vec![0, 7]), true), "{body}");
+        assert_eq!(count(&kept, one(ELECT)), elects);
+        let dropped = specialized(other, &body, (0, 1));
+        assert_eq!((declared_bindings(&dropped), needs(&dropped)), (Some(vec![0]), false), "{body}");
+        assert_eq!(count(&dropped, one(ELECT)), 0);
+    }
+    assert_eq!(declared_bindings(&[1, 2, 3]), None);
 }

@@ -99,9 +99,18 @@ fn bake_searches(code: &mut Code<'_>, scene: &BakedScene, bodies: &mut Vec<(usiz
         let result = emit_search(code, &ray, faces, search);
         bodies.push((function, code.end(result)));
     }
-    let function = code.find_function("baked_numbers(")?;
-    code.begin(function);
-    let count = code.constant_uint(scene.triangles.iter().map(|t| t.number + 1).max().unwrap_or(0));
-    bodies.push((function, code.end(count)));
+    let numbers = scene.triangles.iter().map(|t| t.number + 1).max().unwrap_or(0);
+    let tests = |faces: &[Face]| faces.iter().map(|face| face.triangles.len() as u32).sum();
+    let constants = [
+        ("baked_numbers(", numbers),
+        ("baked_nearest_tests(", tests(&all)),
+        ("baked_occluded_tests(", tests(&occluders)),
+    ];
+    for (name, number) in constants {
+        let function = code.find_function(name)?;
+        code.begin(function);
+        let number = code.constant_uint(number);
+        bodies.push((function, code.end(number)));
+    }
     Some(())
 }

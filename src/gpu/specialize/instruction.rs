@@ -12,6 +12,7 @@ pub(super) mod op {
     pub(in super::super) const LINE: u16 = 8;
     pub(in super::super) const EXT_INST_IMPORT: u16 = 11;
     pub(in super::super) const EXT_INST: u16 = 12;
+    pub(in super::super) const CAPABILITY: u16 = 17;
     pub(in super::super) const ENTRY_POINT: u16 = 15;
     pub(in super::super) const TYPE_BOOL: u16 = 20;
     pub(in super::super) const TYPE_INT: u16 = 21;
@@ -74,6 +75,7 @@ pub(super) mod op {
     pub(in super::super) const RETURN_VALUE: u16 = 254;
     pub(in super::super) const UNREACHABLE: u16 = 255;
     pub(in super::super) const NO_LINE: u16 = 317;
+    pub(in super::super) const GROUP_NON_UNIFORM_ELECT: u16 = 333;
 }
 
 /// Which words behind the result type and the result are ids.
@@ -151,6 +153,8 @@ fn grammar(opcode: u16) -> Option<Grammar> {
         op::SELECT | 202 | 203 => value(All(3)),
         201 => value(All(4)),
         op::EXT_INST => value(AllBut(1)),
+        // It depends on which lanes run together.
+        op::GROUP_NON_UNIFORM_ELECT => Grammar { pure: false, ..value(Ids(1)) },
         op::PHI => value(All(0)),
         op::LOOP_MERGE => acts(Ids(2)),
         op::SELECTION_MERGE => acts(Ids(1)),

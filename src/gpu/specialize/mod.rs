@@ -24,9 +24,13 @@ pub use faces::BakedTriangle;
 use constants::Constants;
 use control_flow::{ControlFlow, Exit};
 use emit::Emitter;
+use instruction::op;
 use module::Module;
 use propagate::Facts;
 use uses::Uses;
+
+/// Decoration: Binding.
+const BINDING: u32 = 33;
 
 /// `spirv` with `values` (id and value) for its specialisation constants and without what they leave dead; constants
 /// that are not named keep their defaults.
@@ -50,4 +54,20 @@ pub fn specialize(spirv: &[u32], values: &[(u32, u32)]) -> Option<Vec<u32>> {
         emitter.emit_function(*function, flow);
     }
     Some(emitter.words)
+}
+
+/// The numbers of the bindings that a module declares, of all descriptor sets, ascending. `None` if it is no module.
+pub fn declared_bindings(spirv: &[u32]) -> Option<Vec<u32>> {
+    let module = Module::read(spirv)?;
+    let globals = module.instructions[..module.globals].iter();
+    let mut numbers: Vec<u32> = globals
+        .filter(|instruction| instruction.opcode == op::DECORATE)
+        .filter_map(|instruction| match module.operands(instruction) {
+            &[_, BINDING, number] => Some(number),
+            _ => None,
+        })
+        .collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    Some(numbers)
 }

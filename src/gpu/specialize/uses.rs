@@ -12,6 +12,12 @@ use super::propagate::Facts;
 const FUNCTION_STORAGE: u32 = 7;
 /// Decoration: BuiltIn.
 const BUILT_IN: u32 = 11;
+/// Capability: GroupNonUniform, which what follows needs.
+const GROUP_NON_UNIFORM: u32 = 61;
+/// OpGroupNonUniformElect and its kin.
+const SUBGROUP_OPERATIONS: std::ops::RangeInclusive<u16> = op::GROUP_NON_UNIFORM_ELECT..=366;
+/// Built-ins: SubgroupSize and its kin.
+const SUBGROUP_BUILT_INS: std::ops::RangeInclusive<u32> = 36..=41;
 
 /// Marks what is used.
 pub(super) struct Uses<'a> {
@@ -71,7 +77,25 @@ impl<'a> Uses<'a> {
         while let Some(i) = this.pending.pop() {
             this.mark_operands(i);
         }
+        if !this.needs_subgroups() {
+            for (i, instruction) in module.instructions[..module.globals].iter().enumerate() {
+                this.used[i] &= instruction.opcode != op::CAPABILITY
+                    || module.operands(instruction) != [GROUP_NON_UNIFORM].as_slice();
+            }
+        }
         this
+    }
+
+    /// Whether anything that is left asks which lanes run together.
+    fn needs_subgroups(&self) -> bool {
+        self.module.instructions.iter().enumerate().any(|(i, instruction)| {
+            match (instruction.opcode, self.module.operands(instruction)) {
+                (op::DECORATE, &[target, BUILT_IN, which]) => {
+                    SUBGROUP_BUILT_INS.contains(&which) && self.is_id_used(target)
+                }
+                (opcode, _) => SUBGROUP_OPERATIONS.contains(&opcode) && self.used[i],
+            }
+        })
     }
 
     fn mark_global(&mut self, i: usize) {
