@@ -1,10 +1,10 @@
 # The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
-.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short bench-speed test test-drivers e2e stress lint references gallery clean
+.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short bench-speed test test-drivers e2e e2e-if-possible stress lint references gallery clean
 .DEFAULT_GOAL := help
 
 help: ## lists these commands
 	@echo "Sunfleck, a headless path tracer on Vulkan compute. Commands:"
-	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1 \t\2/p' $(MAKEFILE_LIST) | expand -t 22
+	@sed -n 's/^\([a-z0-9-]*\):[^#]*## \(.*\)/  make \1 \t\2/p' $(MAKEFILE_LIST) | expand -t 26
 
 deps: ## installs what is missing (apt-get on Debian and Ubuntu; elsewhere says what is needed)
 	@scripts/deps.sh
@@ -30,8 +30,11 @@ test: deps ## builds and runs every test on the device of this machine
 test-drivers: deps ## runs the tests of the GPU on lavapipe 22, lavapipe 25 (both back ends) and SwiftShader
 	@scripts/test-drivers.sh
 
-e2e: build ## drives the page of `watch` in headless Chromium (wants node, chromium, and playwright-core from npm)
-	node tests/e2e/watch.mjs target/release/sunfleck
+e2e: build ## drives the page of `watch` in headless Chromium (wants node and chromium; SUNFLECK_E2E_INSTALL=1 installs them)
+	@scripts/e2e.sh
+
+e2e-if-possible: build ## the same for CI: where node or chromium is missing, it says so and is left out
+	@scripts/e2e.sh --skip
 
 stress: deps ## numbers under stress, in full, on the device of this machine (a quarter of an hour and more)
 	SUNFLECK_STRESS=full cargo test --test stress -- --nocapture --test-threads 1

@@ -31,6 +31,17 @@ layout(set = 0, binding = 6, std430) buffer CounterBlock { RayCounters block_cou
 layout(set = 0, binding = 7, std430) buffer QueueBlock { SliceQueue queue; };
 layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 
+#ifdef DEBUG_PRINTS
+// The dispatch that prints has one lane; behind its result stand what it prints, and an empty header.
+uint debug_count = 0u;
+void debug_end() { results[1u + debug_count].rays = 0u; }
+void debug_write(uint header, uvec4 words) {
+    if (slice.prints == 0u || debug_count >= DEBUG_RECORDS) return;
+    debug_count += 1u;
+    results[debug_count] = BlockResult(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, header, words.x, words.y, words.z, words.w);
+}
+#endif
+
 // Longest path; reported when it is met. Roulette ends paths long before.
 const uint BOUNCE_CAP = 65535u;
 
@@ -66,8 +77,10 @@ void add_radiance(inout LaneState lane, uint bounce, vec3 light) {
     bool counts = bounce == 0u ? ADDS_EMISSION : (bounce == 1u ? ADDS_DIRECT : ADDS_INDIRECT);
     if (!counts) return;
     if (CLAMPS_INDIRECT && bounce >= 2u) light = clamp_light(light, constants.clamp_indirect);
+#ifndef DEBUG_VIEW
     lane.radiance += light;
     accumulate(lane, light);
+#endif
 }
 
 // The share of emission seen along a BSDF sample whose density light sampling matches with `light_pdf`.
@@ -198,6 +211,10 @@ bool scatter(inout LaneState lane, Surface surface, vec3 wo, Hit hit, LightRecei
 }
 
 void finish_sample(inout LaneState lane) {
+#ifdef DEBUG_VIEW
+    lane.radiance = take_debug_value();
+    accumulate(lane, lane.radiance);
+#endif
     uint bit = 1u << (lane.sample_index % BLOCK_SAMPLES);
     if (!is_finite(lane.radiance)) lane.non_finite |= bit;
     lane.luminance_squared += sqr(luminance(lane.radiance));
@@ -364,7 +381,7 @@ void render(inout LaneState lane) {
         if (has_path) {
             trace_advance(trace, constants);
             if (!trace_done(trace)) continue;
-            has_path = advance_path(lane, trace_hit(trace));
+            has_path = !SAMPLE_ENDS(!advance_path(lane, trace_hit(trace)));
             if (!has_path) finish_sample(lane);
         }
         if (!has_path && !start_next(lane)) break;
@@ -397,6 +414,7 @@ void render_baked(inout LaneState lane) {
             if (COUNTS_VISITS) count_traced(RAY_SHADOW);
             has_path = finish_shadow(lane, free);
         }
+        has_path = !SAMPLE_ENDS(!has_path);
         if (!has_path) finish_sample(lane);
     }
 }
@@ -417,6 +435,9 @@ void main() {
     else
 #endif
     render(lane);
+#ifdef DEBUG_PRINTS
+    if (slice.prints != 0u) debug_end();
+#endif
     // A lane without an atom has no state.
     if (lane.atom == NONE) lanes[index].atom = NONE;
     else lanes[index] = lane;

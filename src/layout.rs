@@ -483,8 +483,10 @@ pub struct SliceConstants {
     pub resume: u32,
     /// Number of atoms.
     pub atoms: u32,
+    /// 1 if the only lane writes what it prints behind its result (shaders/include/debug.glsl).
+    pub prints: u32,
     /// Unused, zero.
-    pub unused: [u32; 2],
+    pub unused: u32,
 }
 
 /// The atoms of a slice, of which a lane takes the next when it has finished one.
@@ -496,6 +498,9 @@ pub struct SliceQueue {
     /// Atoms that are complete.
     pub done: u32,
 }
+
+/// Most values that a lane prints.
+pub const DEBUG_RECORDS: u32 = 64;
 
 /// Samples of an aligned block.
 pub const BLOCK_SAMPLES: u32 = 16;

@@ -2,6 +2,7 @@
 // tests/gpu/layout.rs holds the two together.
 #ifndef LAYOUT_GLSL
 #define LAYOUT_GLSL
+#include "debug.glsl"
 
 const uint NONE = 0xffffffffu;
 
@@ -65,6 +66,7 @@ const uint PROJECTION_PERSPECTIVE = 0u;
 const uint PROJECTION_ORTHOGRAPHIC = 1u;
 
 const uint BLOCK_SAMPLES = 16u;
+const uint DEBUG_RECORDS = 64u;
 
 const uint AOV_ALBEDO = 0u;
 const uint AOV_NORMAL = 1u;
@@ -123,8 +125,8 @@ struct SliceConstants {
     uint ray_budget;
     uint resume;
     uint atoms;
-    uint unused_0;
-    uint unused_1;
+    uint prints;
+    uint unused;
 };
 
 struct SliceQueue {

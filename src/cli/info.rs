@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 use serde_json::{Value, json};
-use sunfleck::scene::{AlphaMode, Bsdf, Environment, Lobe, Material, Projection, PunctualKind, Scene, load};
+use sunfleck::scene::{AlphaMode, Environment, Lobe, Material, Projection, PunctualKind, Scene, load};
 
 use sunfleck::gpu::{DeviceKind, TraceBackend};
 use sunfleck::prepare::Prepared;
@@ -66,7 +66,7 @@ impl Counts {
         let placed = || scene.instances.iter().flat_map(|instance| &scene.meshes[instance.mesh].primitives);
         let mut materials_by_bsdf = BTreeMap::new();
         for material in &scene.materials {
-            *materials_by_bsdf.entry(bsdf_name(material.bsdf)).or_insert(0) += 1;
+            *materials_by_bsdf.entry(material.bsdf.name()).or_insert(0) += 1;
         }
         Self {
             primitives: primitives().count(),
@@ -80,17 +80,6 @@ impl Counts {
             materials_by_bsdf,
             image_bytes: scene.images.iter().map(image_bytes).sum(),
         }
-    }
-}
-
-fn bsdf_name(bsdf: Bsdf) -> &'static str {
-    match bsdf {
-        Bsdf::Lambertian => "lambertian",
-        Bsdf::Mirror => "mirror",
-        Bsdf::Refract => "refract",
-        Bsdf::Glass => "glass",
-        Bsdf::MetallicRoughness => "metallic-roughness",
-        Bsdf::Unlit => "unlit",
     }
 }
 
@@ -141,7 +130,7 @@ fn material(material: &Material) -> Value {
     };
     json!({
         "name": material.name,
-        "bsdf": bsdf_name(material.bsdf),
+        "bsdf": material.bsdf.name(),
         "lobes": material.lobes().into_iter().map(Lobe::name).collect::<Vec<_>>(),
         "textures": material.texture_uses(),
         "alpha": alpha,

@@ -64,6 +64,9 @@ enum Command {
     /// Renders for `watch`, which speaks to it over standard input and output.
     #[command(hide = true)]
     WatchWorker(Box<watch::WorkerArgs>),
+    /// Compiles for `watch`, likewise.
+    #[command(hide = true)]
+    WatchCompiler,
 }
 
 impl Cli {
@@ -97,6 +100,7 @@ pub(crate) fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Shaders(args) => Ok(shaders::run(&args)?),
         Command::ShaderTest(args) => shader_test::run(args),
         Command::WatchWorker(args) => watch::run_worker(&args),
+        Command::WatchCompiler => Ok(sunfleck::watch::compiler::run()?),
     }
 }
 

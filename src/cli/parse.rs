@@ -17,6 +17,12 @@ where
     PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
 }
 
+/// `X,Y`: a column and a row.
+pub(crate) fn pixel(text: &str) -> Result<[u32; 2], String> {
+    let read = |(x, y): (&str, &str)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]);
+    text.split_once(',').and_then(read).ok_or_else(|| "a pixel is X,Y in whole numbers, as 256,128".to_owned())
+}
+
 /// `1280x720`.
 pub(crate) fn resolution(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));

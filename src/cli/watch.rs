@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use sunfleck::render::{Settings, choose_camera};
-use sunfleck::watch::messages::View;
+use sunfleck::watch::messages::{Estimator, View};
 use sunfleck::watch::session::{self, Options, Serving};
 use sunfleck::watch::worker;
 use sunfleck::{Error, Result};
@@ -44,6 +44,10 @@ pub(crate) struct WatchArgs {
     /// No page: one line in the terminal for each save.
     #[arg(long, conflicts_with_all = ["port", "bind"], help_heading = "Page")]
     no_serve: bool,
+    /// The pixel whose DEBUG_PRINT values are shown, counted from the top left, until another is pinned on the page
+    /// [default: the one in the middle].
+    #[arg(long, value_name = "X,Y", value_parser = parse::pixel, help_heading = "Image")]
+    pixel: Option<[u32; 2]>,
     /// Replace the process that renders if it is silent for so long.
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = parse::duration, help_heading = "Device")]
     hang: Duration,
@@ -111,13 +115,15 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
     let options = Options {
         scene: args.job.scene.clone(),
         environment: environment.file,
-        shaders: settings.shaders_dir,
+        shaders: settings.shaders_dir.clone(),
         worker_arguments,
         view: View {
             camera,
-            integrator: settings.integrator.name().to_owned(),
+            estimator: Estimator::of(&settings),
             exposure: args.tone.exposure,
             tonemap: args.tone.tonemap.to_string(),
+            debug: !args.no_serve,
+            pixel: args.pixel,
             ..View::default()
         },
         command: format!("sunfleck render {scene} {}", quoted.join(" ")),
@@ -129,8 +135,9 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
 /// Renders for the server at the other end of standard input and output.
 pub(crate) fn run_worker(args: &WorkerArgs) -> anyhow::Result<()> {
     let (settings, environment) = args.settings()?;
-    let load = || load_scene(&args.scene, &environment, true).map_err(|error| format!("{error:#}"));
-    match worker::run(settings, &load) {
+    let scene = args.scene.clone();
+    let load = move || load_scene(&scene, &environment, true).map_err(|error| format!("{error:#}"));
+    match worker::run(settings, Box::new(load)) {
         // The server is gone.
         Err(Error::Interrupted) => Ok(()),
         result => Ok(result?),

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::OnceLock;
 
 /// A shader that does not compile: the compiler's message, which names file and line.
 #[derive(Debug)]
@@ -12,6 +13,21 @@ pub struct CompileError {
     pub file: String,
     /// The compiler's messages, each with the source line that it names.
     pub message: String,
+    /// Its errors by their places, in its order; empty if it names none.
+    pub errors: Vec<ErrorAtLine>,
+}
+
+/// An error of the compiler at its place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorAtLine {
+    /// File below the shader folder.
+    pub file: String,
+    /// Line, from 1.
+    pub line: u32,
+    /// What is wrong.
+    pub message: String,
+    /// The line; empty if the file has no such line.
+    pub source: String,
 }
 
 impl fmt::Display for CompileError {
@@ -34,9 +50,9 @@ pub type Sources = BTreeMap<String, String>;
 /// # Errors
 /// [`CompileError`] with the compiler's message.
 pub fn compile(sources: &Sources, file: &str, defines: &[(&str, String)]) -> Result<Vec<u32>, CompileError> {
-    let error = |message: String| CompileError { file: file.to_owned(), message };
+    let error = |message: String| CompileError { file: file.to_owned(), message, errors: Vec::new() };
     let source = sources.get(file).ok_or_else(|| error("there is no such file".to_owned()))?;
-    let compiler = shaderc::Compiler::new().map_err(|e| error(e.to_string()))?;
+    let compiler = compiler().map_err(|e| error(e.to_string()))?;
     let mut options = shaderc::CompileOptions::new().map_err(|e| error(e.to_string()))?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
     options.set_target_spirv(shaderc::SpirvVersion::V1_5);
@@ -53,8 +69,19 @@ pub fn compile(sources: &Sources, file: &str, defines: &[(&str, String)]) -> Res
     });
     let artifact = compiler
         .compile_into_spirv(source, shaderc::ShaderKind::Compute, file, "main", Some(&options))
-        .map_err(|e| error(with_source_lines(sources, &e.to_string())))?;
+        .map_err(|e| located(sources, file, &e.to_string()))?;
     Ok(artifact.as_binary().to_vec())
+}
+
+/// One compiler for the whole process: with the last one go glslang's tables of built-in functions, and making them takes
+/// as long as compiling the path tracer does.
+fn compiler() -> shaderc::Result<&'static shaderc::Compiler> {
+    static COMPILER: OnceLock<shaderc::Compiler> = OnceLock::new();
+    if let Some(compiler) = COMPILER.get() {
+        return Ok(compiler);
+    }
+    let made = shaderc::Compiler::new()?;
+    Ok(COMPILER.get_or_init(|| made))
 }
 
 /// The file that `requested` means in an `#include` of the file `from`.
@@ -62,16 +89,35 @@ pub fn resolve_include(from: &str, requested: &str) -> String {
     join(from.rsplit_once('/').map_or("", |(folder, _)| folder), requested)
 }
 
-/// The compiler's messages; below each that names a file and a line stands that line.
-fn with_source_lines(sources: &Sources, message: &str) -> String {
-    let source_line = |line: &str| {
-        let mut parts = line.splitn(3, ':');
-        let text = sources.get(parts.next()?)?;
-        let number: usize = parts.next()?.parse().ok()?;
-        text.lines().nth(number.checked_sub(1)?).map(|source| format!("{number:>6} | {source}"))
-    };
-    let lines = message.trim_end().lines().flat_map(|line| [Some(line.to_owned()), source_line(line)]);
-    lines.flatten().collect::<Vec<_>>().join("\n")
+/// The compiler's messages with, below each that names a file and a line, that line.
+fn located(sources: &Sources, file: &str, text: &str) -> CompileError {
+    let mut error = CompileError { file: file.to_owned(), message: String::new(), errors: Vec::new() };
+    let mut lines = Vec::new();
+    for line in text.trim_end().lines() {
+        lines.push(line.to_owned());
+        let Some((place, is_error)) = place_of(sources, line) else { continue };
+        if !place.source.is_empty() {
+            lines.push(format!("{:>6} | {}", place.line, place.source));
+        }
+        // glslang closes with a message that only repeats that there were errors.
+        if is_error && !place.message.is_empty() && !place.message.starts_with("compilation terminated") {
+            error.errors.push(place);
+        }
+    }
+    error.message = lines.join("\n");
+    error
+}
+
+/// `FILE:LINE: error: MESSAGE` or `FILE:LINE: warning: MESSAGE`, and whether it is an error.
+fn place_of(sources: &Sources, text: &str) -> Option<(ErrorAtLine, bool)> {
+    let split = |separator| Some((text.split_once(separator)?, separator == ": error: "));
+    let ((place, message), is_error) = split(": error: ").or_else(|| split(": warning: "))?;
+    let (file, line) = place.rsplit_once(':')?;
+    let line: u32 = line.parse().ok()?;
+    let source = line.checked_sub(1).and_then(|i| sources.get(file)?.lines().nth(i as usize)).unwrap_or_default();
+    let place =
+        ErrorAtLine { file: file.to_owned(), line, message: message.trim().to_owned(), source: source.to_owned() };
+    Some((place, is_error))
 }
 
 /// Resolves `..` in `folder/relative`.

@@ -3,10 +3,12 @@
 mod bake;
 mod calibrate;
 mod function_kernel;
+mod kernel_build;
 mod kernel_key;
 mod looks;
 mod open;
 mod path_tracer;
+mod prints;
 mod progress;
 mod result;
 mod run;
@@ -22,13 +24,15 @@ use std::time::Instant;
 pub use bake::{Bake, BakeReport, Baked, MOST_BAKED_RECORDS, MOST_BAKED_TRIANGLES};
 pub use calibrate::calibrate;
 pub use function_kernel::{FunctionCall, FunctionKernel};
+pub use kernel_build::BindingOverride;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};
-pub use path_tracer::{BindingOverride, PathTracer};
+pub use path_tracer::PathTracer;
+pub use prints::Printed;
 pub use progress::ProgressUpdate;
 pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
 pub use run::{Run, RunPlan};
-pub use scene_buffers::choose_array_form;
+pub use scene_buffers::{SceneBuffers, choose_array_form};
 pub use settings::{
     DeviceChoice, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings, TraceChoice,
     choose_camera,

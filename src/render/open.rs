@@ -16,6 +16,21 @@ pub struct OpenDevice {
     pub reason: String,
 }
 
+impl OpenDevice {
+    /// A device on which kernels can be built while this one renders: this one, but for CPU devices, where a driver may
+    /// compile in the queue's thread (lavapipe does, at the first dispatch). They are opened a second time.
+    ///
+    /// # Errors
+    /// When the driver refuses.
+    pub fn for_building(&self) -> Result<Arc<Gpu>> {
+        if self.gpu.info.kind != DeviceKind::Cpu {
+            return Ok(Arc::clone(&self.gpu));
+        }
+        let requirements = DeviceRequirements { ray_query: self.trace == TraceBackend::RayQuery };
+        Ok(Gpu::new(Arc::clone(self.gpu.instance()), self.gpu.info.clone(), requirements)?)
+    }
+}
+
 /// Opens the device that the settings ask for.
 ///
 /// # Errors

@@ -8,50 +8,32 @@ use std::time::{Duration, Instant};
 use ash::vk::BufferUsageFlags as Usage;
 use glam::DVec3;
 
-use super::bake::{Bake, BakeReport};
+use super::bake::BakeReport;
+use super::kernel_build::{BindingOverride, baked_spirv, build_kernel, check_aovs, effective_max_bounces};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
-use super::run::SliceResults;
-use super::scene_buffers::{SceneBuffers, array_binding, choose_array_form};
+use super::run::{Limits, SliceResults};
+use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
-use super::{Integrator, ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
-use crate::film::aov::Aov;
+use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
-use crate::gpu::{
-    ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
-    shader_compiler,
-};
-use crate::layout::{RenderConstants, SliceConstants};
+use crate::gpu::{Buffer, Gpu, Kernel, MemoryUse, TraceBackend};
+use crate::layout::RenderConstants;
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
 
-/// How a [`PathTracer`] is bound, where the device's own choice is not wanted (tests try every form).
-#[derive(Clone, Copy, Debug, Default)]
-pub struct BindingOverride {
-    /// Form and log2 of the texels of a chunk.
-    pub array_form: Option<(ArrayForm, u32)>,
-    /// Lanes of a workgroup.
-    pub workgroup_size: Option<u32>,
-    /// Atoms of every slice.
-    pub slice_atoms: Option<u32>,
-    /// Rays of an atom that a lane may trace in one dispatch.
-    pub ray_budget: Option<u32>,
-    /// The driver puts in the specialisation constants, not [`crate::gpu::specialize`].
-    pub driver_specializes: bool,
-}
-
 /// A scene on a device, ready to be rendered.
 pub struct PathTracer {
     key: KernelKey,
-    kernel: Kernel,
-    constants: RenderConstants,
+    pub(super) kernel: Kernel,
+    pub(super) constants: RenderConstants,
     /// Where rebased space has its zero.
     origin: DVec3,
-    constants_buffer: Buffer,
-    slices: Vec<Slice>,
-    buffers: SceneBuffers,
+    pub(super) constants_buffer: Buffer,
+    pub(super) slices: Vec<Slice>,
+    buffers: Arc<SceneBuffers>,
     overrides: BindingOverride,
     bake: BakeReport,
     /// Seconds that compiling and uploading took.
@@ -81,7 +63,46 @@ impl PathTracer {
             Some(form) => form,
             None => choose_array_form(&gpu.info, &lengths)?,
         };
-        let buffers = SceneBuffers::upload(gpu, prepared, trace, form)?;
+        let buffers = Arc::new(SceneBuffers::upload(gpu, prepared, trace, form)?);
+        let mut tracer = Self::on_buffers(buffers, prepared, camera, settings, overrides)?;
+        tracer.upload_seconds = (start.elapsed().as_secs_f64() - tracer.compile_seconds).max(0.0);
+        Ok(tracer)
+    }
+
+    /// Another tracer of a scene that is on a device: on the same device its arrays are shared, on another they are uploaded
+    /// again.
+    ///
+    /// # Errors
+    /// Those of [`PathTracer::new`].
+    pub fn beside(
+        buffers: &Arc<SceneBuffers>,
+        gpu: &Arc<Gpu>,
+        prepared: &Prepared,
+        camera: &Camera,
+        settings: &Settings,
+        overrides: BindingOverride,
+    ) -> Result<Self> {
+        let buffers = if Arc::ptr_eq(gpu, &buffers.gpu) {
+            Arc::clone(buffers)
+        } else {
+            Arc::new(SceneBuffers::upload(gpu, prepared, buffers.trace, buffers.form)?)
+        };
+        Self::on_buffers(buffers, prepared, camera, settings, overrides)
+    }
+
+    /// The scene's arrays on the device.
+    pub fn buffers(&self) -> &Arc<SceneBuffers> {
+        &self.buffers
+    }
+
+    fn on_buffers(
+        buffers: Arc<SceneBuffers>,
+        prepared: &Prepared,
+        camera: &Camera,
+        settings: &Settings,
+        overrides: BindingOverride,
+    ) -> Result<Self> {
+        let gpu = &buffers.gpu;
         let mut constants = prepared.constants;
         camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
         constants.max_bounces = effective_max_bounces(settings);
@@ -94,10 +115,9 @@ impl PathTracer {
             MemoryUse::Upload,
         )?;
         let slice_atoms = overrides.slice_atoms.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
-        let mut key = KernelKey::new(prepared, camera, settings, trace, form);
+        let mut key = KernelKey::new(prepared, camera, settings, buffers.trace, buffers.form);
         let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_atoms, &key)).collect();
         let mut slices = slices?;
-        let upload_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
@@ -114,7 +134,7 @@ impl PathTracer {
             overrides,
             bake,
             compile_seconds,
-            upload_seconds,
+            upload_seconds: 0.0,
         })
     }
 
@@ -133,10 +153,10 @@ impl PathTracer {
     ///
     /// # Errors
     /// A shader that does not compile, a lost device.
-    pub fn rebuild(&mut self, gpu: &Arc<Gpu>, prepared: &Prepared, camera: &Camera, settings: &Settings) -> Result<()> {
+    pub fn rebuild(&mut self, prepared: &Prepared, camera: &Camera, settings: &Settings) -> Result<()> {
         let start = Instant::now();
-        let form = (self.key.array_form, self.key.chunk_shift);
-        let mut key = KernelKey::new(prepared, camera, settings, self.key.trace, form);
+        let gpu = &self.buffers.gpu;
+        let mut key = self.key_for(prepared, camera, settings);
         (key.aovs, key.statistics) = (self.key.aovs, self.key.statistics);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
         let kernel =
@@ -147,6 +167,11 @@ impl PathTracer {
         self.constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
         self.compile_seconds = start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// The key of the kernel that [`PathTracer::rebuild`] would build, but for what it would compile in.
+    pub fn key_for(&self, prepared: &Prepared, camera: &Camera, settings: &Settings) -> KernelKey {
+        KernelKey::new(prepared, camera, settings, self.buffers.trace, self.buffers.form)
     }
 
     /// Looks through another camera of the same kind (lens, projection), on a film of another size.
@@ -267,104 +292,4 @@ impl PathTracer {
     fn total_samples(&self, per_pixel: u32) -> u64 {
         u64::from(per_pixel) * u64::from(self.constants.width) * u64::from(self.constants.height)
     }
-}
-
-/// What ends a range before its samples do, and what its progress is measured by.
-struct Limits {
-    start: Instant,
-    time: Option<Duration>,
-    samples_total: Option<u64>,
-}
-
-/// A driver does not say what its ray queries visit.
-fn check_aovs(aovs: &[Aov], trace: TraceBackend) -> Result<()> {
-    if aovs.contains(&Aov::Cost) && trace == TraceBackend::RayQuery {
-        return Err(Error::Usage(String::from(
-            "--aov cost: nobody can tell what ray queries visit; add --trace bvh, or leave cost out",
-        )));
-    }
-    Ok(())
-}
-
-/// An integrator that adds nothing behind the first scattering events need not look there.
-fn effective_max_bounces(settings: &Settings) -> u32 {
-    let needed = match settings.integrator {
-        Integrator::Emission => 0,
-        Integrator::Direct => 1,
-        Integrator::Path | Integrator::Indirect => u32::MAX,
-    };
-    settings.max_bounces.unwrap_or(u32::MAX).min(needed)
-}
-
-/// The kernel with what of the scene is to be compiled in; the key says so from then on.
-fn baked_spirv(
-    gpu: &Gpu,
-    prepared: &Prepared,
-    settings: &Settings,
-    overrides: BindingOverride,
-    key: &mut KernelKey,
-) -> Result<(Vec<u32>, BakeReport)> {
-    let bake = Bake::choose(prepared, gpu.info.kind, key.trace, settings.bake && !overrides.driver_specializes);
-    let (spirv, baked) = bake.apply(kernel_spirv(key, settings)?);
-    key.baked = baked;
-    Ok((spirv, bake.report(baked)))
-}
-
-fn build_kernel(
-    gpu: &Arc<Gpu>,
-    key: &KernelKey,
-    spirv: &[u32],
-    overrides: BindingOverride,
-    buffers: &SceneBuffers,
-    constants: &Buffer,
-    slices: &[Slice],
-) -> Result<Kernel> {
-    let arrays = buffers.bindings();
-    let array_binding = array_binding(buffers, key.array_form, &arrays);
-    let sets: Vec<Vec<(u32, BindingResource<'_>)>> = slices
-        .iter()
-        .map(|slice| {
-            // What the kernel does not keep it does not declare, unless the driver specialises it: then it does not use it.
-            let mut set = vec![
-                (0, BindingResource::Uniform(constants)),
-                (1, BindingResource::Storage(&slice.results)),
-                (2, BindingResource::Storage(&slice.lane_states)),
-                (3, array_binding),
-            ];
-            set.extend(buffers.acceleration.as_ref().map(|a| (4, BindingResource::AccelerationStructure(a))));
-            set.push((5, BindingResource::Storage(slice.aovs.as_ref().unwrap_or(&slice.results))));
-            set.push((6, BindingResource::Storage(slice.counters.as_ref().unwrap_or(&slice.results))));
-            set.push((7, BindingResource::Storage(&slice.queue)));
-            set
-        })
-        .collect();
-    let sets: Vec<&[(u32, BindingResource<'_>)]> = sets.iter().map(Vec::as_slice).collect();
-    let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
-    Ok(Kernel::new(
-        gpu,
-        &KernelDescription {
-            name: "path_trace",
-            spirv,
-            workgroup_size,
-            constants: &key.specialization(),
-            driver_specializes: overrides.driver_specializes,
-            push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
-            sets: &sets,
-        },
-    )?)
-}
-
-/// What the shader loop has compiled, else the embedded variant, or one compiled from `--shaders`.
-fn kernel_spirv(key: &KernelKey, settings: &Settings) -> Result<Vec<u32>> {
-    if let Some(spirv) = &settings.kernel_spirv {
-        return Ok(spirv.to_vec());
-    }
-    let Some(folder) = &settings.shaders_dir else {
-        let bytes = embedded::PATH_TRACE[key.trace as usize][key.array_form as usize];
-        return Ok(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect());
-    };
-    let sources = shader_compiler::read_sources(folder).map_err(|e| Error::io(folder, "read the shader folder", e))?;
-    let defines =
-        [("TRACE_BACKEND", (key.trace as u32).to_string()), ("ARRAY_FORM", (key.array_form as u32).to_string())];
-    shader_compiler::compile(&sources, "path_trace.comp", &defines).map_err(|e| Error::input(folder, e.to_string()))
 }

@@ -1,7 +1,7 @@
 //! A run of the kernel: what it is to render, and what has come back of it.
 
 use std::ops::Range;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
 
@@ -41,6 +41,13 @@ impl RunPlan {
             estimate: settings.estimate,
         }
     }
+}
+
+/// What ends a range before its samples do, and what its progress is measured by.
+pub(super) struct Limits {
+    pub(super) start: Instant,
+    pub(super) time: Option<Duration>,
+    pub(super) samples_total: Option<u64>,
 }
 
 /// What a run of the kernel returns.

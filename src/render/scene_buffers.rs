@@ -61,8 +61,14 @@ pub(super) fn binds_storage(info: &DeviceInfo) -> bool {
     info.limits.stage_storage_buffers as usize >= SCENE_ARRAYS * MAX_CHUNKS + 2
 }
 
-/// The scene's buffers.
-pub(super) struct SceneBuffers {
+/// The scene's buffers on a device.
+pub struct SceneBuffers {
+    /// Where they are.
+    pub(super) gpu: Arc<Gpu>,
+    /// What they are made for.
+    pub(super) trace: TraceBackend,
+    /// How they are bound: the form, and log2 of a chunk's texels.
+    pub(super) form: (ArrayForm, u32),
     /// `MAX_CHUNKS` bindings an array; an absent chunk is an empty buffer.
     chunks: Vec<Vec<Buffer>>,
     empty: Buffer,
@@ -97,7 +103,8 @@ impl SceneBuffers {
         let acceleration = (trace == TraceBackend::RayQuery).then(|| build_acceleration(gpu, prepared)).transpose()?;
         let bytes = chunks.iter().flatten().map(|b| b.size).sum::<u64>()
             + acceleration.as_ref().map_or(0, AccelerationStructures::bytes);
-        Ok(Self { chunks, empty, addresses, acceleration, bytes })
+        let (gpu, form) = (Arc::clone(gpu), (form, chunk_shift));
+        Ok(Self { gpu, trace, form, chunks, empty, addresses, acceleration, bytes })
     }
 
     /// The bindings of `scene_arrays`.

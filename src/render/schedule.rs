@@ -51,3 +51,22 @@ pub(super) fn pixel_of_index(constants: &RenderConstants, index: u64) -> (u32, u
     let y = tile / tiles_across * 8 + inside / 8;
     (u32::try_from(x).unwrap_or(u32::MAX), u32::try_from(y).unwrap_or(u32::MAX))
 }
+
+/// The index of a pixel.
+pub(super) fn index_of_pixel(constants: &RenderConstants, x: u32, y: u32) -> u32 {
+    let tile = y / 8 * constants.width.div_ceil(8) + x / 8;
+    tile * 64 + y % 8 * 8 + x % 8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_has_the_index_that_it_is_found_by() {
+        let constants = RenderConstants { width: 21, height: 9, ..RenderConstants::default() };
+        for (x, y) in [(0, 0), (7, 7), (8, 0), (20, 8), (3, 8)] {
+            assert_eq!(pixel_of_index(&constants, u64::from(index_of_pixel(&constants, x, y))), (x, y));
+        }
+    }
+}

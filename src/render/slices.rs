@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use ash::vk::BufferUsageFlags as Usage;
 
+use super::kernel_build::BindingOverride;
 use super::kernel_key::KernelKey;
-use super::path_tracer::BindingOverride;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
-use crate::layout::{AovSums, BlockResult, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue};
+use crate::layout::{AovSums, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue};
 
 /// Slices that are submitted before the oldest is read.
 pub(super) const SLICES_IN_FLIGHT: usize = 2;
@@ -53,12 +53,15 @@ impl Slice {
     /// A slice of at most so many atoms.
     pub(super) fn new(gpu: &Arc<Gpu>, atoms: u32, key: &KernelKey) -> Result<Self> {
         let lanes = if gpu.info.kind == DeviceKind::Cpu { atoms.min(MOST_CPU_LANES) } else { atoms };
-        let bytes = |each: usize| u64::from(atoms) * each as u64;
-        let readback = |name, each| Buffer::new(gpu, name, bytes(each), Usage::STORAGE_BUFFER, MemoryUse::Readback);
+        let readback = |name, atoms: u32, each: usize| {
+            Buffer::new(gpu, name, u64::from(atoms) * each as u64, Usage::STORAGE_BUFFER, MemoryUse::Readback)
+        };
+        // Behind the result of the lane that prints there is room for what it prints.
+        let results = readback("block results", atoms.max(2 + DEBUG_RECORDS), size_of::<BlockResult>())?;
         Ok(Self {
-            results: readback("block results", size_of::<BlockResult>())?,
-            aovs: (key.aovs != 0).then(|| readback("AOVs", size_of::<AovSums>())).transpose()?,
-            counters: key.statistics.then(|| readback("counters", size_of::<RayCounters>())).transpose()?,
+            results,
+            aovs: (key.aovs != 0).then(|| readback("AOVs", atoms, size_of::<AovSums>())).transpose()?,
+            counters: key.statistics.then(|| readback("counters", atoms, size_of::<RayCounters>())).transpose()?,
             lane_states: Buffer::new(
                 gpu,
                 "lane states",
@@ -161,6 +164,7 @@ pub(super) struct SliceSizes {
     atoms: u32,
     largest: u32,
     ray_budget: u32,
+    target: Duration,
     fixed_atoms: bool,
     fixed_budget: bool,
 }
@@ -176,6 +180,7 @@ impl SliceSizes {
             atoms: overrides.slice_atoms.unwrap_or(FIRST_ATOMS).min(largest),
             largest,
             ray_budget: overrides.ray_budget.unwrap_or(1024),
+            target: overrides.slice_time.unwrap_or(TARGET),
             fixed_atoms: overrides.slice_atoms.is_some(),
             fixed_budget: overrides.ray_budget.is_some(),
         }
@@ -193,7 +198,7 @@ impl SliceSizes {
     pub(super) fn observe(&mut self, outcome: &SliceOutcome) {
         let own = outcome.seconds / SLICES_IN_FLIGHT as f64;
         if !self.fixed_atoms {
-            let factor = (TARGET.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
+            let factor = (self.target.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
             let wanted = f64::from(outcome.constants.atoms) * factor;
             self.atoms = (wanted as u32).clamp(FIRST_ATOMS.min(self.largest), self.largest);
         }

@@ -19,6 +19,20 @@ pub enum Bsdf {
     Unlit,
 }
 
+impl Bsdf {
+    /// Its name for people, as scene files and reports have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lambertian => "lambertian",
+            Self::Mirror => "mirror",
+            Self::Refract => "refract",
+            Self::Glass => "glass",
+            Self::MetallicRoughness => "metallic-roughness",
+            Self::Unlit => "unlit",
+        }
+    }
+}
+
 /// Which Fresnel term [`Bsdf::Glass`] uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fresnel {

@@ -1,12 +1,12 @@
 //! The compiler's message as file, line, column and the line itself.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use crate::gpu::shader_compiler::{CompileError, Sources};
+use crate::gpu::shader_compiler::{CompileError, ErrorAtLine, Sources};
 use crate::watch::includes::{reached_from, trail};
 
 /// One message of the compiler.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Diagnostic {
     /// File below the shader folder.
     pub file: String,
@@ -24,8 +24,10 @@ pub struct Diagnostic {
 
 impl std::fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.message)?;
-        if self.line > 0 {
+        if self.line == 0 {
+            write!(f, "{}: {}", self.file, self.message)?;
+        } else {
+            write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.message)?;
             // Tabs keep their width above the caret.
             let indent: String = self.source.chars().take(self.column.max(1) as usize - 1).collect();
             let indent: String = indent.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
@@ -38,46 +40,32 @@ impl std::fmt::Display for Diagnostic {
     }
 }
 
-/// The messages of a failed compilation; one at least.
+/// The errors of a failed compilation; one at least.
 pub fn diagnose(error: &CompileError, sources: &Sources) -> Vec<Diagnostic> {
     let reached = reached_from(sources, &error.file);
-    let mut found: Vec<_> = error.message.lines().filter_map(|line| parse(line, sources)).collect();
-    // glslang closes with a message that only repeats that there were errors.
-    found.retain(|d| !d.message.is_empty() && !d.message.starts_with("compilation terminated"));
-    if found.is_empty() {
-        found.push(Diagnostic {
-            file: error.file.clone(),
-            line: 0,
-            column: 0,
-            message: error.message.trim().to_owned(),
-            source: String::new(),
-            included_from: Vec::new(),
-        });
+    let at_line = |found: &ErrorAtLine| Diagnostic {
+        file: found.file.clone(),
+        line: found.line,
+        column: column_of(&found.message, &found.source),
+        message: found.message.clone(),
+        source: found.source.clone(),
+        included_from: trail(&reached, &found.file),
+    };
+    if !error.errors.is_empty() {
+        return error.errors.iter().map(at_line).collect();
     }
-    for diagnostic in &mut found {
-        diagnostic.included_from = trail(&reached, &diagnostic.file);
-    }
-    found
-}
-
-/// `FILE:LINE: error: MESSAGE`.
-fn parse(text: &str, sources: &Sources) -> Option<Diagnostic> {
-    let (place, message) = text.split_once(": error: ")?;
-    let (file, line) = place.rsplit_once(':')?;
-    let line: u32 = line.parse().ok()?;
-    let source = line.checked_sub(1).and_then(|i| sources.get(file)?.lines().nth(i as usize)).unwrap_or_default();
-    Some(Diagnostic {
-        file: file.to_owned(),
-        line,
-        column: column_of(message, source),
-        message: message.trim().to_owned(),
-        source: source.to_owned(),
+    vec![Diagnostic {
+        file: error.file.clone(),
+        line: 0,
+        column: 0,
+        message: error.message.trim().to_owned(),
+        source: String::new(),
         included_from: Vec::new(),
-    })
+    }]
 }
 
 /// glslang names no column, but quotes what it stumbled over.
-fn column_of(message: &str, source: &str) -> u32 {
+pub(super) fn column_of(message: &str, source: &str) -> u32 {
     let quoted = message.split('\'').nth(1).filter(|word| !word.is_empty());
     let byte = quoted.and_then(|word| find_word(source, word));
     let byte = byte.unwrap_or_else(|| source.len() - source.trim_start().len());

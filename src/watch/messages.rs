@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use super::estimator::Estimator;
+
 /// What is to be seen: the whole of it every time, so that a new worker needs no history.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -12,12 +14,17 @@ pub struct View {
     pub pose: Option<Pose>,
     /// The camera is being moved: fewer pixels, more images.
     pub moving: bool,
-    /// Name of a [`crate::render::Integrator`].
-    pub integrator: String,
+    /// What decides which code runs.
+    #[serde(flatten)]
+    pub estimator: Estimator,
     /// Exposure in steps: +1 doubles the brightness.
     pub exposure: f32,
     /// Name of a [`crate::film::tonemap::ToneMap`].
     pub tonemap: String,
+    /// The picture is what shaders give to DEBUG_PIXEL, if any does.
+    pub debug: bool,
+    /// The pixel (column, row) whose DEBUG_PRINT values are shown; `None` is the one in the middle.
+    pub pixel: Option<[u32; 2]>,
 }
 
 /// A camera by what it looks at. World space, metres.
@@ -35,12 +42,18 @@ pub struct Pose {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum ToWorker {
     /// Show this.
-    View(View),
+    View(Box<View>),
     /// Render with the SPIR-V that follows.
     Kernel {
         /// Number of the edit that it comes from.
         edit: u32,
+        /// It was compiled with DEBUG_PRINTS.
+        prints: bool,
     },
+    /// An edit is about to be compiled: leave the processor to it, unless the picture moves or is not there yet.
+    Hold,
+    /// Nothing came of it.
+    Resume,
     /// Load the scene again.
     Scene {
         /// Number of the edit.
@@ -122,7 +135,12 @@ pub struct Frame {
 pub enum FromWorker {
     /// The scene is on the device.
     Ready(Ready),
-    /// The kernel of an edit is built.
+    /// The kernel of an edit is being built, while the old one goes on. It hangs if nothing follows.
+    Building {
+        /// Number of the edit.
+        edit: u32,
+    },
+    /// The kernel of an edit is built, and used from now on.
     Built {
         /// Number of the edit.
         edit: u32,
@@ -138,8 +156,7 @@ pub enum FromWorker {
     },
     /// An image.
     Frame(Frame),
-    /// What it does, each time that changes and while it renders: a worker that is busy with `build` or `render` and is not
-    /// heard of any more hangs.
+    /// What it does, each time that changes and while it renders: a worker that renders and is not heard of any more hangs.
     Stage(Stage),
     /// A pixel under the cursor.
     Pixel {
@@ -155,6 +172,17 @@ pub enum FromWorker {
         samples: u32,
         /// Variance of the mean luminance, from independent samples.
         variance: Option<f64>,
+        /// What is seen there.
+        seen: Option<Seen>,
+    },
+    /// What the kernel prints for the first sample of a pixel.
+    Prints {
+        /// Number of the edit.
+        edit: u32,
+        /// Column and row.
+        pixel: [u32; 2],
+        /// The number of the line that prints, and the value.
+        values: Vec<(u32, String)>,
     },
     /// An image file follows.
     Saved {
@@ -165,13 +193,32 @@ pub enum FromWorker {
     },
 }
 
+/// The nearest surface behind the middle of a pixel, through a pinhole and as if nothing were transparent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// Name of the material, or its number.
+    pub material: String,
+    /// Name of its BSDF.
+    pub bsdf: String,
+    /// Name of the mesh, or its number.
+    pub mesh: String,
+    /// Name of the instance (the node), or its number.
+    pub instance: String,
+    /// Number of the primitive in its mesh.
+    pub primitive: usize,
+    /// Number of the triangle in its primitive.
+    pub triangle: usize,
+    /// From the camera, in metres.
+    pub distance: f64,
+    /// Whether its back is seen.
+    pub is_back: bool,
+}
+
 /// What a worker is at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Stage {
     /// Reads and prepares the scene.
     Load,
-    /// Builds a kernel.
-    Build,
     /// Renders.
     Render,
     /// Waits for something to do.
@@ -183,7 +230,7 @@ pub enum Stage {
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum FromPage {
     /// Show this.
-    View(View),
+    View(Box<View>),
     /// A pixel.
     Inspect {
         /// Column.

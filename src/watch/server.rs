@@ -18,11 +18,20 @@ use super::messages::FromPage;
 const FILES: &[(&str, &str, &str)] = &[
     ("/", "text/html; charset=utf-8", include_str!("../../assets/watch/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../../assets/watch/style.css")),
-    ("/app.js", "text/javascript; charset=utf-8", include_str!("../../assets/watch/app.js")),
-    ("/camera.js", "text/javascript; charset=utf-8", include_str!("../../assets/watch/camera.js")),
-    ("/picture.js", "text/javascript; charset=utf-8", include_str!("../../assets/watch/picture.js")),
-    ("/plot.js", "text/javascript; charset=utf-8", include_str!("../../assets/watch/plot.js")),
+    script("/app.js", include_str!("../../assets/watch/app.js")),
+    script("/camera.js", include_str!("../../assets/watch/camera.js")),
+    script("/input.js", include_str!("../../assets/watch/input.js")),
+    script("/inspect.js", include_str!("../../assets/watch/inspect.js")),
+    script("/picture.js", include_str!("../../assets/watch/picture.js")),
+    script("/plot.js", include_str!("../../assets/watch/plot.js")),
+    script("/report.js", include_str!("../../assets/watch/report.js")),
+    script("/state.js", include_str!("../../assets/watch/state.js")),
+    script("/view.js", include_str!("../../assets/watch/view.js")),
 ];
+
+const fn script(path: &'static str, text: &'static str) -> (&'static str, &'static str, &'static str) {
+    (path, "text/javascript; charset=utf-8", text)
+}
 
 /// Nothing from elsewhere, and no other site may frame the page.
 const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\

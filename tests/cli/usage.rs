@@ -161,8 +161,13 @@ fn shaders_are_exported_and_checked() {
     let kernel = folder.path().join("mine/path_trace.comp");
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders/path_trace.comp");
     assert_eq!(std::fs::read(&kernel).unwrap(), std::fs::read(repository).unwrap());
+    let removed = folder.path().join("mine/include/bsdf.glsl");
+    std::fs::remove_file(&removed).unwrap();
     let (code, _, stderr) = run_in(folder.path(), &["shaders", "export", "mine"]);
     assert!(code == 2 && stderr.contains("are there already; --force"), "{code}: {stderr}");
+    assert!(!removed.exists(), "nothing is written where something is in the way");
+    assert_eq!(run_in(folder.path(), &["shaders", "export", "--force", "mine"]).0, 0);
+    assert!(removed.exists());
     let (code, _, stderr) = run_in(folder.path(), &["shaders", "check", "mine"]);
     assert!(code == 0 && stderr.contains("kernels compile"), "{code}: {stderr}");
     let include = folder.path().join("mine/include/mis.glsl");

@@ -35,6 +35,9 @@ const status = (path, headers) => new Promise((resolve, reject) => {
   get(address + path, { headers }, (answer) => resolve(answer.resume().statusCode)).on("error", reject);
 });
 
+// A factor that no kernel was ever built with: drivers keep what they have compiled.
+const fresh = () => 0.8 + 0.2 * Math.random();
+
 const step = async (name, work) => {
   const start = performance.now();
   await work();
@@ -108,7 +111,7 @@ try {
     times.error.push(performance.now() - start);
     const before = await page.evaluate(() => document.body.dataset.edit);
     start = performance.now();
-    writeFileSync(leaf, original.replaceAll("p.color", `(p.color * ${1 - i / 100})`));
+    writeFileSync(leaf, original.replaceAll("p.color", `(p.color * ${fresh()})`));
     await page.waitForFunction((before) => document.body.dataset.edit !== before, before, { timeout: 60000 });
     times.image.push(performance.now() - start);
   }
@@ -154,11 +157,90 @@ try {
     await shot("heat");
     await page.keyboard.press("b");
   });
+  await step("the page goes on while a kernel is built", async () => {
+    await page.evaluate(() => {
+      window.arrivals = [];
+      new MutationObserver(() => window.arrivals.push([performance.now(), Number(document.body.dataset.edit)]))
+        .observe(document.body, { attributes: true, attributeFilter: ["data-frames"] });
+    });
+    const box = await page.locator("#picture").boundingBox();
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    const old = await page.evaluate(() => Number(document.body.dataset.edit));
+    let saved;
+    for (let i = 0; i < 400; i++) {
+      await page.mouse.move(box.x + box.width / 2 + 100 * Math.sin(i / 20), box.y + box.height / 2);
+      await page.waitForTimeout(20);
+      if (i === 20) {
+        saved = await page.evaluate(() => performance.now());
+        writeFileSync(leaf, original.replaceAll("p.color", `(p.color * ${fresh()})`));
+      }
+      if ((await page.evaluate(() => Number(document.body.dataset.edit))) !== old) break;
+    }
+    await page.mouse.up();
+    const arrivals = (await page.evaluate(() => window.arrivals)).filter(([at]) => at > saved);
+    const meanwhile = arrivals.filter(([, edit]) => edit === old);
+    const times = [saved, ...meanwhile.map(([at]) => at), arrivals.find(([, edit]) => edit !== old)[0]];
+    figures["images of the old kernel while the new one is built"] = meanwhile.length;
+    figures["longest stall of a drag while it is built"] = Math.round(Math.max(...times.slice(1).map((at, i) => at - times[i])));
+    assert(meanwhile.length >= 3, `${times}`);
+    await page.click("#reset");
+    writeFileSync(leaf, original);
+    await edit(old + 2);
+  });
+  await finished();
   await step("inspect a pixel", async () => {
     await page.locator("#picture").click({ position: { x: 200, y: 200 } });
     await page.waitForFunction(() => document.getElementById("pixel-samples").textContent === "64");
     const radiance = (await page.textContent("#pixel-radiance")).trim().split(/\s+/).map(Number);
     assert(radiance.length === 3 && radiance.every((c) => c >= 0), `${radiance}`);
+    assert.match(await page.textContent("#pixel-material"), /\(lambertian/);
+    assert.match(await page.textContent("#pixel-triangle"), /^\d+ of primitive \d+$/);
+    assert.match(await page.textContent("#pixel-distance"), / m$/);
+  });
+  await step("DEBUG_PIXEL is the picture, DEBUG_PRINT is listed with its line", async () => {
+    const light = await mean();
+    const call = "DEBUG_PIXEL(vec3(0.0, 0.5, 1.0)); DEBUG_PRINT(p.color);";
+    const scatter = "vec3 wi = sample_cosine_hemisphere(u.yz);";
+    assert(original.includes(scatter));
+    const now = await page.evaluate(() => Number(document.body.dataset.edit));
+    writeFileSync(leaf, original.replace(scatter, `${call}\n    ${scatter}`));
+    await edit(now + 1);
+    const [r, g, b] = await mean();
+    assert(r < 5 && g > 100 && b > 200, `${[r, g, b]}`);
+    await page.waitForFunction(() => document.getElementById("prints-list").textContent.includes("p.color = ("));
+    assert.match(await page.textContent("#prints-list"), /bsdf_lambertian.glsl:\d+/);
+    await shot("debug");
+    await page.keyboard.press("v");
+    await page.waitForTimeout(1500);
+    await finished();
+    const back = await mean();
+    assert(Math.abs(back[0] - light[0]) < 5, `the calls stand there, the light is shown: ${light} ${back}`);
+    await page.keyboard.press("v");
+    writeFileSync(leaf, original);
+    await page.waitForFunction(() => document.getElementById("debug-row").hidden && document.getElementById("prints").hidden);
+    await edit(now + 2);
+    await finished();
+  });
+  await step("other estimators", async () => {
+    const light = await mean();
+    const starts = () => page.evaluate(() => document.body.dataset.start);
+    for (const [id, value] of [["light-sampling", "bsdf"], ["light-sampling", "mis"], ["sampler", "independent"], ["sampler", "sobol"]]) {
+      const before = await starts();
+      await page.selectOption(`#${id}`, value);
+      await page.waitForFunction((before) => document.body.dataset.start !== before, before, { timeout: 60000 });
+      assert((await page.textContent("#command")).includes(`--${id}=${value}`));
+    }
+    const before = await starts();
+    await page.fill("#max-bounces", "1");
+    await page.keyboard.press("Tab");
+    await page.waitForFunction((before) => document.body.dataset.start !== before, before, { timeout: 60000 });
+    const direct = await mean();
+    assert(direct[0] < light[0] - 5, `${light} ${direct}`);
+    await page.fill("#max-bounces", "");
+    await page.keyboard.press("Tab");
+    await page.waitForTimeout(1000);
+    await finished();
   });
   await step("save", async () => {
     for (const [button, magic] of [["#png", "89504e47"], ["#exr", "762f3101"]]) {
@@ -173,9 +255,17 @@ try {
     await page.emulateMedia({ colorScheme: "dark" });
     await page.waitForTimeout(300);
     await shot("small-dark");
+    await page.evaluate(() => document.querySelector("aside").scrollIntoView());
+    await shot("small-dark-controls");
     await page.setViewportSize({ width: 1600, height: 1000 });
     await page.waitForTimeout(300);
     await shot("large-dark");
+    await page.setViewportSize({ width: 1920, height: 1080 });
+    await page.waitForTimeout(300);
+    await shot("wide-dark");
+    await page.emulateMedia({ colorScheme: "light" });
+    await page.waitForTimeout(300);
+    await shot("wide");
     const overflow = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
     assert(!overflow, "the page scrolls sideways");
   });

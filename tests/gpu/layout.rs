@@ -144,8 +144,7 @@ fn blocks_have_the_same_offsets_on_both_sides() {
     assert_eq!(shader_fields(&blocks.constants), render_constants_fields());
     assert_eq!(Type::Struct(blocks.constants).nbyte(), Some(size_of::<RenderConstants>()));
 
-    let mut slice = rust_fields!(SliceConstants: first_atom, lanes, first_block, ray_budget, resume, atoms, unused);
-    split(&mut slice, "unused", &["_0", "_1"], "u32");
+    let slice = rust_fields!(SliceConstants: first_atom, lanes, first_block, ray_budget, resume, atoms, prints, unused);
     assert_eq!(shader_fields(&blocks.slice), slice);
     assert_eq!(Type::Struct(blocks.slice).nbyte(), Some(size_of::<SliceConstants>()));
 

@@ -1,0 +1,49 @@
+//! The estimator of a view, as the page switches it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::render::Settings;
+
+/// The estimator that is shown: all but `max_bounces` are specialisation constants of the kernel.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Estimator {
+    /// Name of a [`crate::render::Integrator`].
+    pub integrator: String,
+    /// Name of a [`crate::render::LightSampling`].
+    pub light_sampling: String,
+    /// Name of a [`crate::render::MisHeuristic`].
+    pub mis: String,
+    /// Name of a [`crate::render::SamplerKind`].
+    pub sampler: String,
+    /// Scattering events a path may have; `None` is unlimited.
+    pub max_bounces: Option<u32>,
+}
+
+impl Estimator {
+    /// Of settings.
+    pub fn of(settings: &Settings) -> Self {
+        Self {
+            integrator: settings.integrator.name().to_owned(),
+            light_sampling: settings.light_sampling.name().to_owned(),
+            mis: settings.mis_heuristic.name().to_owned(),
+            sampler: settings.sampler.name().to_owned(),
+            max_bounces: settings.max_bounces,
+        }
+    }
+
+    /// Puts it into settings. A name that means nothing changes nothing.
+    pub fn apply(&self, settings: &mut Settings) {
+        Self::read(&mut settings.integrator, &self.integrator);
+        Self::read(&mut settings.light_sampling, &self.light_sampling);
+        Self::read(&mut settings.mis_heuristic, &self.mis);
+        Self::read(&mut settings.sampler, &self.sampler);
+        settings.max_bounces = self.max_bounces;
+    }
+
+    fn read<T: std::str::FromStr>(target: &mut T, name: &str) {
+        if let Ok(value) = name.parse() {
+            *target = value;
+        }
+    }
+}
