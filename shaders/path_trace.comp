@@ -42,6 +42,22 @@ void debug_write(uint header, uvec4 words) {
 }
 #endif
 
+// Rounds of loops that a lane, and so its vector, may have run before it takes no further atom, and before it waits for the next
+// dispatch. Mesa's lavapipe leaves every loop, without a word, once all of an invocation's loops together have had 65,535
+// rounds. What is between is room for the longest search of a ray.
+const uint ROUNDS_FOR_ATOMS = 40000u;
+const uint ROUNDS_FOR_RAYS = 48000u;
+
+// At most so many rounds has the shading of one hit: a light found in a table or down the light BVH and up again, and a texel
+// of the environment.
+uint shading_rounds() {
+    uint count = 0u;
+    if (!BAKES_LIGHTS) count = 32u;
+    if (HAS_LIGHT_BVH) count = 128u;
+    if (environment_is_sampled_by_texels()) count += 32u;
+    return count;
+}
+
 // Longest path; reported when it is met. Roulette ends paths long before.
 const uint BOUNCE_CAP = 65535u;
 
@@ -351,7 +367,8 @@ void finish_atom(LaneState lane) {
 
 // Takes the slice's next atom that has samples; false if none is left.
 bool take_atom(inout LaneState lane) {
-    while (true) {
+    while (rounds < ROUNDS_FOR_ATOMS) {
+        rounds += 1u;
         uint atom = atomicAdd(queue.taken, 1u);
         if (atom >= slice.atoms) break;
         begin_atom(lane, constants, slice, atom);
@@ -378,6 +395,7 @@ void render(inout LaneState lane) {
     bool has_path = lane.atom != NONE;
     if (has_path) trace_begin(trace, constants, lane.ray, alpha_key(lane));
     while (true) {
+        rounds += trace_advance_rounds() + shading_rounds() + 1u;
         if (has_path) {
             trace_advance(trace, constants);
             if (!trace_done(trace)) continue;
@@ -385,7 +403,7 @@ void render(inout LaneState lane) {
             if (!has_path) finish_sample(lane);
         }
         if (!has_path && !start_next(lane)) break;
-        if (lane.rays >= lane.ray_limit) break;
+        if (lane.rays >= lane.ray_limit || rounds >= ROUNDS_FOR_RAYS) break;
         has_path = true;
         trace_begin(trace, constants, lane.ray, alpha_key(lane));
     }
@@ -398,7 +416,8 @@ void render_baked(inout LaneState lane) {
     bool has_path = lane.atom != NONE;
     while (true) {
         if (!has_path && !start_next(lane)) break;
-        if (lane.rays >= lane.ray_limit) break;
+        if (lane.rays >= lane.ray_limit || rounds >= ROUNDS_FOR_RAYS) break;
+        rounds += shading_rounds() + 1u;
         lane.rays += 1u;
         Found found = find_nearest(constants, lane.ray);
         if (HAS_STATISTICS) count_shading_vector();

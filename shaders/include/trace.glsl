@@ -2,6 +2,7 @@
 //
 //   void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alpha_key);   // see alpha.glsl
 //   void trace_advance(inout Trace trace, RenderConstants constants);   // a bounded amount of work
+//   uint trace_advance_rounds();                                        // the rounds that its loops have at most
 //   bool trace_done(Trace trace);
 //   Hit  trace_hit(Trace trace);                                        // slot NONE: nothing was hit
 //
@@ -35,6 +36,9 @@ struct Hit {
     float t;
     vec2 barycentric;  // weights of the second and third vertex
 };
+
+// At most so many rounds have the loops of the lane's vector had in this dispatch (shaders/path_trace.comp).
+uint rounds = 0u;
 
 bool ray_is_valid(Ray ray) {
     return is_finite(ray.origin) && is_finite(ray.direction) && dot(ray.direction, ray.direction) > 0.0;

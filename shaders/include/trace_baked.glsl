@@ -76,6 +76,8 @@ Found search_numbers(Ray ray) {
     RaySpace space = ray_space(ray.direction);
     Found found = Found(NONE, ray.t_max);
     uint numbers = baked_numbers();
+    // Each lane of a wide vector may have such a search, at another time.
+    rounds += 16u * numbers;
     for (uint number = 0u; number < numbers; ++number) {
         // A leaf without a second triangle, and an empty slot, have one there whose determinant is 0.
         bool is_triangle = LOAD4(SLOTS, (number >> 1u) * SLOT_TEXELS + 2u).w < SLOT_NO_LEAF;

@@ -281,9 +281,16 @@ void trace_step(inout Trace trace, RenderConstants constants) {
 const int STEPS_PER_ADVANCE = 6;
 const int STEPS_PER_ADVANCE_TEXTURED = 40;
 
+int steps_per_advance() {
+    if (HAS_TEXTURES) return STEPS_PER_ADVANCE_TEXTURED;
+    return STEPS_PER_ADVANCE;
+}
+
+// At most so many rounds of loops has trace_advance.
+uint trace_advance_rounds() { return uint(steps_per_advance()) + 1u; }
+
 void trace_advance(inout Trace trace, RenderConstants constants) {
-    int steps = STEPS_PER_ADVANCE;
-    if (HAS_TEXTURES) steps = STEPS_PER_ADVANCE_TEXTURED;
+    int steps = steps_per_advance();
     for (int i = 0; i < steps; ++i) {
         if (trace.current == NONE) break;
         trace_step(trace, constants);

@@ -42,6 +42,9 @@ bool candidate_hits(RenderConstants constants, uvec2 key, TriangleId triangle, v
     return alpha_hits(constants, key, look.material, triangle.slot, triangle.instance, barycentric);
 }
 
+// The rounds of a software driver's own loops, for a large scene; a driver does not tell.
+uint trace_advance_rounds() { return 256u; }
+
 void trace_advance(inout Trace trace, RenderConstants constants) {
     if (trace.done) return;
     if (HAS_STATISTICS) count_search_step();

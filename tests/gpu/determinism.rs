@@ -46,6 +46,22 @@ fn slices_workgroups_and_budgets_do_not_change_a_bit() {
     }
 }
 
+/// Mesa's lavapipe leaves every loop once those of an invocation have had 65,535 rounds. A large slice would have several times as
+/// many, were all of its atoms rendered by the lanes that come first, in searches and in the choice of lights.
+#[test]
+fn a_long_dispatch_does_not_change_a_bit() {
+    let settings = gpu::settings(64, 64);
+    for name in some(&["many_lights", "environment"]) {
+        let atoms = |count| BindingOverride { slice_atoms: Some(count), ..BindingOverride::default() };
+        let samples = if slow_driver() { 0..16 } else { 0..128 };
+        assert!(
+            bits(&film(name, &settings, atoms(64 * 64 * 8), samples.clone()))
+                == bits(&film(name, &settings, atoms(512), samples)),
+            "{name}"
+        );
+    }
+}
+
 #[test]
 fn the_form_of_the_arrays_and_their_chunks_do_not_change_a_bit() {
     let device = gpu::device();
