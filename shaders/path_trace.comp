@@ -44,9 +44,9 @@ void debug_write(uint header, uvec4 words) {
 
 // Rounds of loops that a lane, and so its vector, may have run before it takes no further atom, and before it waits for the next
 // dispatch. Mesa's lavapipe leaves every loop, without a word, once all of an invocation's loops together have had 65,535
-// rounds. What is between is room for the longest search of a ray.
-const uint ROUNDS_FOR_ATOMS = 40000u;
-const uint ROUNDS_FOR_RAYS = 48000u;
+// rounds. The room above is for the longest search of a ray, and for loops that the driver makes.
+const uint ROUNDS_FOR_ATOMS = 24000u;
+const uint ROUNDS_FOR_RAYS = 32000u;
 
 // At most so many rounds has the shading of one hit: a light found in a table or down the light BVH and up again, and a texel
 // of the environment.
@@ -387,24 +387,32 @@ bool start_next(inout LaneState lane) {
         if (!take_atom(lane)) return false;
     }
     start_sample(lane);
+    lane.has_path = 1u;
     return true;
 }
 
+// The path goes on with its next ray, or the sample is finished.
+void follow_path(inout LaneState lane, bool goes_on) {
+    if (!SAMPLE_ENDS(!goes_on)) return;
+    finish_sample(lane);
+    lane.has_path = 0u;
+}
+
+bool must_wait(LaneState lane) { return lane.rays >= lane.ray_limit || rounds >= ROUNDS_FOR_RAYS; }
+
+// After each round the lane's state is whole: wherever the loop is left, it can go on from there.
 void render(inout LaneState lane) {
     Trace trace;
-    bool has_path = lane.atom != NONE;
-    if (has_path) trace_begin(trace, constants, lane.ray, alpha_key(lane));
+    if (lane.has_path != 0u) trace_begin(trace, constants, lane.ray, alpha_key(lane));
     while (true) {
         rounds += trace_advance_rounds() + shading_rounds() + 1u;
-        if (has_path) {
+        if (lane.has_path != 0u) {
             trace_advance(trace, constants);
             if (!trace_done(trace)) continue;
-            has_path = !SAMPLE_ENDS(!advance_path(lane, trace_hit(trace)));
-            if (!has_path) finish_sample(lane);
+            follow_path(lane, advance_path(lane, trace_hit(trace)));
         }
-        if (!has_path && !start_next(lane)) break;
-        if (lane.rays >= lane.ray_limit || rounds >= ROUNDS_FOR_RAYS) break;
-        has_path = true;
+        if (lane.has_path == 0u && !start_next(lane)) break;
+        if (must_wait(lane)) break;
         trace_begin(trace, constants, lane.ray, alpha_key(lane));
     }
 }
@@ -413,28 +421,26 @@ void render(inout LaneState lane) {
 // A search ends at once, so that all lanes shade together; the shadow ray is traced by a search of its own, which only asks
 // whether there is anything.
 void render_baked(inout LaneState lane) {
-    bool has_path = lane.atom != NONE;
     while (true) {
-        if (!has_path && !start_next(lane)) break;
-        if (lane.rays >= lane.ray_limit || rounds >= ROUNDS_FOR_RAYS) break;
-        rounds += shading_rounds() + 1u;
+        rounds += shading_rounds() + 4u;
+        if (lane.has_path == 0u && !start_next(lane)) break;
+        if (must_wait(lane)) break;
         lane.rays += 1u;
         Found found = find_nearest(constants, lane.ray);
         if (HAS_STATISTICS) count_shading_vector();
         if (COUNTS_VISITS) count_traced(path_ray_kind(lane));
-        has_path = false;
+        bool goes_on = false;
         // Behind the one test, the triangle is loaded once for the hit and for shading.
-        if (found.slot != NONE) has_path = shade_surface(lane, found_hit(lane.ray, found));
+        if (found.slot != NONE) goes_on = shade_surface(lane, found_hit(lane.ray, found));
         else leave_scene(lane);
-        if (has_path && lane.ray.any_hit) {
+        if (goes_on && lane.ray.any_hit) {
             lane.rays += 1u;
             bool free = !trace_occluded(constants, lane.ray);
             if (HAS_STATISTICS) count_shading_vector();
             if (COUNTS_VISITS) count_traced(RAY_SHADOW);
-            has_path = finish_shadow(lane, free);
+            goes_on = finish_shadow(lane, free);
         }
-        has_path = !SAMPLE_ENDS(!has_path);
-        if (!has_path) finish_sample(lane);
+        follow_path(lane, goes_on);
     }
 }
 #endif
@@ -444,10 +450,12 @@ void main() {
     if (index >= slice.lanes) return;
     LaneState lane = idle_lane();
     if (slice.resume != 0u) {
-        lane = lanes[index];
-        if (lane.atom == NONE) return;
-        lane.ray_limit = lane.rays + slice.ray_budget;
-        if (HAS_EXTRAS) load_extras(lane.atom);
+        // A lane without an atom takes the next, like a new one.
+        if (lanes[index].atom != NONE) {
+            lane = lanes[index];
+            lane.ray_limit = lane.rays + slice.ray_budget;
+            if (HAS_EXTRAS) load_extras(lane.atom);
+        }
     }
 #if TRACE_BACKEND == TRACE_BVH
     if (BAKES_GEOMETRY) render_baked(lane);

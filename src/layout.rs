@@ -584,4 +584,4 @@ pub struct RayCounters {
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
-pub const LANE_STATE_BYTES: usize = 288;
+pub const LANE_STATE_BYTES: usize = 304;

@@ -40,6 +40,7 @@ struct LaneState {
     float passed;          // from the last vertex that was no pane to the origin of the path's ray
     uint atom;             // of the slice, NONE if the lane has none
     uint ray_limit;        // rays of the atom at which the lane waits for the next dispatch
+    uint has_path;         // 0 between samples
 };
 
 // Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
@@ -81,6 +82,7 @@ LaneState idle_lane() {
     lane.passed = 0.0;
     lane.atom = NONE;
     lane.ray_limit = 0u;
+    lane.has_path = 0u;
     return lane;
 }
 

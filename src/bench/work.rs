@@ -61,6 +61,7 @@ impl<'a> Work<'a> {
                 samples_total: self.samples_total,
                 elapsed: self.start.elapsed(),
                 time_limit: self.time_limit,
+                run: None,
             })
         })?;
         if run.stopped_by == StopReason::Interrupted {

@@ -88,6 +88,9 @@ pub(crate) struct RenderArgs {
     /// slices: a table, and an object in --json. Slows the render down a little.
     #[arg(long, help_heading = "Reports")]
     stats: bool,
+    /// Show the image and its AOVs in the viewer tev that listens there, while they are rendered [port: 14158].
+    #[arg(long, value_name = "HOST[:PORT]", help_heading = "Reports")]
+    tev: Option<String>,
     /// Print one JSON object about the run on standard output.
     #[arg(long, help_heading = "Reports")]
     json: bool,
@@ -119,6 +122,8 @@ pub(crate) struct RenderJob {
     pub(crate) exposure_ev: f32,
     /// Tone curve of PNG outputs.
     pub(crate) tone_map: ToneMap,
+    /// Address of a viewer that shows the image.
+    pub(crate) tev: Option<String>,
     /// Print a JSON object on standard output.
     pub(crate) json: bool,
     /// Say nothing but warnings.
@@ -168,6 +173,7 @@ impl RenderArgs {
             environment,
             exposure_ev: self.tone.exposure,
             tone_map: self.tone.tonemap,
+            tev: self.tev,
             json: self.json,
             quiet: self.quiet,
         })

@@ -11,6 +11,7 @@ pub mod metrics;
 pub mod output;
 pub mod png;
 pub mod replicates;
+pub mod tev;
 pub mod tonemap;
 
 /// Weights of linear Rec.709 red, green and blue in the luminance (ITU-R BT.709).

@@ -282,6 +282,7 @@ impl PathTracer {
                 samples_total: limits.samples_total,
                 elapsed: limits.start.elapsed(),
                 time_limit: limits.time,
+                run: Some(&*run),
             };
             if progress(&update).is_break() {
                 run.stop(StopReason::Interrupted);

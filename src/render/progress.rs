@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use super::Run;
+
 /// The state of a render, given to the caller's closure after every slice. The closure answers with
 /// [`std::ops::ControlFlow::Break`] to stop: the render then returns what it has, as [`super::StopReason::Interrupted`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProgressUpdate {
+#[derive(Clone, Copy, Debug)]
+pub struct ProgressUpdate<'a> {
     /// Samples done so far, over all pixels.
     pub samples_done: u64,
     /// Samples to do, over all pixels; `None` if only time or an error ends the render.
@@ -14,9 +16,11 @@ pub struct ProgressUpdate {
     pub elapsed: Duration,
     /// The time limit, if there is one.
     pub time_limit: Option<Duration>,
+    /// What there is so far, for whoever wants to show it; `None` if what goes on is more than one image.
+    pub run: Option<&'a Run>,
 }
 
-impl ProgressUpdate {
+impl ProgressUpdate<'_> {
     /// Samples per second so far.
     pub fn samples_per_second(&self) -> f64 {
         self.samples_done as f64 / self.elapsed.as_secs_f64().max(1e-9)
@@ -47,6 +51,7 @@ mod tests {
             samples_total: Some(100),
             elapsed: Duration::from_secs(10),
             time_limit: Some(Duration::from_secs(20)),
+            run: None,
         };
         assert_eq!(update.fraction(), 0.5);
         assert_eq!(update.remaining(), Some(Duration::from_secs(10)));

@@ -7,5 +7,6 @@ mod driver_environment;
 mod guide;
 mod images;
 mod shader_test;
+mod tev;
 mod usage;
 mod watch;

@@ -51,7 +51,7 @@ fn slices_workgroups_and_budgets_do_not_change_a_bit() {
 #[test]
 fn a_long_dispatch_does_not_change_a_bit() {
     let settings = gpu::settings(64, 64);
-    for name in some(&["many_lights", "environment"]) {
+    for name in some(&["cornell", "many_lights", "environment"]) {
         let atoms = |count| BindingOverride { slice_atoms: Some(count), ..BindingOverride::default() };
         let samples = if slow_driver() { 0..16 } else { 0..128 };
         assert!(
