@@ -490,5 +490,5 @@ fn our_own_scenes() {
         count += 1;
     }
     assert!(count >= 14, "{count} scenes");
-    assert_eq!(builtin::names(), ["cornell"]);
+    assert_eq!(builtin::names(), ["cornell", "bumpy"]);
 }
