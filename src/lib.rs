@@ -43,6 +43,7 @@ pub mod gpu;
 pub mod layout;
 mod named_enum;
 pub mod prepare;
+mod random;
 pub mod render;
 pub mod scene;
 pub mod shader_test;

@@ -51,6 +51,16 @@ uvec2 pixel_of_index(RenderConstants constants, uint index) {
     return uvec2(tile % tiles_across, tile / tiles_across) * 8u + uvec2(inside % 8u, inside / 8u);
 }
 
+void begin_block(inout LaneState lane) {
+    lane.rays = 0u;
+    lane.non_finite = 0u;
+    lane.capped = 0u;
+    lane.sum = vec3(0.0);
+    lane.luminance_squared = 0.0;
+    lane.compensation = vec3(0.0);
+    lane.samples = 0u;
+}
+
 LaneState idle_lane() {
     LaneState lane;
     lane.ray = Ray(vec3(0.0), vec3(0.0), 0.0, false, NO_TRIANGLE, NO_TRIANGLE);
@@ -67,14 +77,8 @@ LaneState idle_lane() {
     lane.next_origin = vec3(0.0);
     lane.path_ends = 0u;
     lane.next_direction = vec3(0.0);
-    lane.rays = 0u;
     lane.next_from = NO_TRIANGLE;
-    lane.non_finite = 0u;
-    lane.capped = 0u;
-    lane.sum = vec3(0.0);
-    lane.luminance_squared = 0.0;
-    lane.compensation = vec3(0.0);
-    lane.samples = 0u;
+    begin_block(lane);
     lane.cone = RayCone(0.0, 0.0);
     lane.receiver = LightReceiver(vec3(0.0), 0.0, vec3(0.0));
     lane.media = OUTSIDE;
@@ -99,13 +103,7 @@ void begin_atom(inout LaneState lane, RenderConstants constants, SliceConstants 
     lane.sample_index = max(first, constants.first_sample);
     // The last block may end at sample index 2^32 − 1.
     lane.end_sample = outside ? lane.sample_index : first + min(BLOCK_SAMPLES, constants.end_sample - first);
-    lane.rays = 0u;
-    lane.non_finite = 0u;
-    lane.capped = 0u;
-    lane.sum = vec3(0.0);
-    lane.luminance_squared = 0.0;
-    lane.compensation = vec3(0.0);
-    lane.samples = 0u;
+    begin_block(lane);
 }
 
 // Adds to the block's sum without losing what rounding cuts off (Knuth's TwoSum): the sum of the integrators' images is

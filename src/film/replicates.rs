@@ -166,24 +166,14 @@ impl Terms {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// SplitMix64 (Steele, Lea and Flood 2014), as a number in [0, 1).
-    struct Random(u64);
-    impl Random {
-        fn unit(&mut self) -> f64 {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-        }
-    }
+    use crate::random::SplitMix;
 
     const PIXELS: usize = 400;
     const SAMPLES: u32 = 16;
 
     /// An image of `blocks` blocks; pixel p has luminance 1 + p/PIXELS and samples of uniform noise between 0 and twice
     /// that. Returns the sums and the true error.
-    fn noisy(random: &mut Random, blocks: u32) -> (ReplicateSums, f64) {
+    fn noisy(random: &mut SplitMix, blocks: u32) -> (ReplicateSums, f64) {
         let mut sums = ReplicateSums::new(PIXELS);
         let mut square = 0.0;
         for pixel in 0..PIXELS {
@@ -201,7 +191,7 @@ mod tests {
 
     #[test]
     fn the_estimate_is_unbiased_and_its_interval_holds_the_error() {
-        let mut random = Random(5);
+        let mut random = SplitMix(5);
         for blocks in [4, 8, 12, 40] {
             let (mut covered, mut ratio) = (0, 0.0);
             const RUNS: usize = 200;

@@ -107,8 +107,10 @@ impl Circumstances {
         let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
         let [width, cache, optimisation] = [WIDTH_VARIABLE, CACHE_VARIABLE, OPTIMISATION_VARIABLE].map(variable);
         // Reading the drivers takes milliseconds, which are spent only where the answer matters.
-        let lavapipes = if cache.is_none() && width.is_none() { lavapipe_versions() } else { Vec::new() };
-        Self { width, cache, optimisation, has_avx512: has_avx512(), lavapipes, cache_folder: cache_folder(), paths }
+        let has_avx512 = has_avx512();
+        let asks = cache.is_none() && width.is_none() && (has_avx512 || is_short(paths));
+        let lavapipes = if asks { lavapipe_versions() } else { Vec::new() };
+        Self { width, cache, optimisation, has_avx512, lavapipes, cache_folder: cache_folder(), paths }
     }
 }
 
@@ -124,6 +126,10 @@ fn has_avx512() -> bool {
     return false;
 }
 
+fn is_short(paths: Option<u64>) -> bool {
+    paths.is_some_and(|paths| paths <= MOST_NARROW_PATHS)
+}
+
 fn choose(around: &Circumstances) -> DriverEnvironment {
     if around.cache.is_some() {
         return DriverEnvironment::nothing(format!("{CACHE_VARIABLE} is set"));
@@ -135,6 +141,9 @@ fn choose(around: &Circumstances) -> DriverEnvironment {
     if let Some(width) = &around.width {
         let reason = format!("{WIDTH_VARIABLE} is set, and Mesa's shader cache does not know the width");
         return DriverEnvironment { set: vec![cache(width)], reason };
+    }
+    if !around.has_avx512 && !is_short(around.paths) {
+        return DriverEnvironment::nothing("the processor has no AVX-512");
     }
     let oldest = match around.lavapipes.iter().map(|version| version.filter(|v| *v >= FIRST_WIDE_MESA)).min() {
         None => return DriverEnvironment::nothing("there is no lavapipe"),

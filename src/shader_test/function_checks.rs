@@ -13,6 +13,7 @@ use super::report::{CheckReport, Level, error_text, number, p_text, within, wors
 use crate::Result;
 use crate::bench::statistics::{Summary, t_two_sided};
 use crate::layout::Texel;
+use crate::random::SplitMix;
 use crate::render::FunctionKernel;
 
 /// A kernel that maps numbers to numbers, its expectations and the level of its statistical checks.
@@ -170,7 +171,7 @@ impl Function<'_> {
 
     /// Outputs at drawn inputs.
     fn draw(&mut self, draws: &std::collections::BTreeMap<String, Draw>, samples: u32) -> Result<Vec<Vec<f64>>> {
-        let mut random = Random(self.seed.into());
+        let mut random = SplitMix(self.seed.into());
         let mut draw = |number: &Number| match draws[&number.name] {
             Draw::Fixed(value) => value,
             Draw::Uniform([low, high]) => {
@@ -228,17 +229,4 @@ fn unpack(numbers: &[Number], texels: &[Texel]) -> Vec<f64> {
         if number.integer { f64::from(*bits) } else { f64::from(f32::from_bits(*bits)) }
     };
     numbers.iter().zip(texels.as_flattened()).map(value).collect()
-}
-
-/// SplitMix64 (Steele, Lea and Flood 2014), with its state.
-struct Random(u64);
-
-impl Random {
-    /// Uniform in [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
 }

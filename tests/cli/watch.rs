@@ -1,7 +1,7 @@
 //! `watch --no-serve` as a shader is edited, broken and mended.
 
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -13,6 +13,15 @@ fn sunfleck() -> Command {
 fn export(folder: &Path, more: &[&str]) -> (Option<i32>, String) {
     let output = sunfleck().args(["shaders", "export"]).arg(folder).args(more).output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// The shaders written to a new folder in this one; an include that every kernel has, and what is in it.
+fn exported(folder: &Path) -> (PathBuf, PathBuf, String) {
+    let shaders = folder.join("shaders");
+    assert_eq!(export(&shaders, &[]).0, Some(0));
+    let leaf = shaders.join("include/bsdf_lambertian.glsl");
+    let original = std::fs::read_to_string(&leaf).unwrap();
+    (shaders, leaf, original)
 }
 
 /// A running `sunfleck watch --no-serve`, killed when dropped.
@@ -61,10 +70,7 @@ impl Drop for Watch {
 #[test]
 fn a_saved_shader_is_measured_a_broken_one_is_located_and_rendering_goes_on() {
     let folder = tempfile::tempdir().unwrap();
-    let shaders = folder.path().join("shaders");
-    assert_eq!(export(&shaders, &[]).0, Some(0));
-    let leaf = shaders.join("include/bsdf_lambertian.glsl");
-    let original = std::fs::read_to_string(&leaf).unwrap();
+    let (shaders, leaf, original) = exported(folder.path());
     let watch = Watch::start(&["--spp", "64"], &shaders);
     watch.expect(&["start:", "Mrays/s", "error", "64 spp"]);
 
@@ -109,10 +115,7 @@ fn signal(process: u32, signal: &str) {
 #[test]
 fn a_compiler_that_hangs_or_dies_is_replaced_and_the_loop_goes_on() {
     let folder = tempfile::tempdir().unwrap();
-    let shaders = folder.path().join("shaders");
-    assert_eq!(export(&shaders, &[]).0, Some(0));
-    let leaf = shaders.join("include/bsdf_lambertian.glsl");
-    let original = std::fs::read_to_string(&leaf).unwrap();
+    let (shaders, leaf, original) = exported(folder.path());
     let watch = Watch::start(&["--hang", "20s", "--spp", "64"], &shaders);
     watch.expect(&["start:", "spp"]);
     for (kills, words) in [(false, "has been at this for 20 s"), (true, "has crashed (signal: 9")] {
@@ -134,10 +137,7 @@ fn a_compiler_that_hangs_or_dies_is_replaced_and_the_loop_goes_on() {
 #[test]
 fn a_worker_that_hangs_or_dies_is_replaced_and_the_loop_goes_on() {
     let folder = tempfile::tempdir().unwrap();
-    let shaders = folder.path().join("shaders");
-    assert_eq!(export(&shaders, &[]).0, Some(0));
-    let leaf = shaders.join("include/bsdf_lambertian.glsl");
-    let original = std::fs::read_to_string(&leaf).unwrap();
+    let (shaders, leaf, original) = exported(folder.path());
     // Samples without end, so that it is at work.
     let watch = Watch::start(&["--hang", "10s", "--spp", "100000000"], &shaders);
     watch.expect(&["start:", "spp"]);
@@ -163,10 +163,7 @@ fn replaced(text: &str, part: &str, by: &str) -> String {
 #[test]
 fn a_kernel_that_hangs_or_kills_the_device_is_named_and_the_last_good_one_goes_on() {
     let folder = tempfile::tempdir().unwrap();
-    let shaders = folder.path().join("shaders");
-    assert_eq!(export(&shaders, &[]).0, Some(0));
-    let leaf = shaders.join("include/bsdf_lambertian.glsl");
-    let original = std::fs::read_to_string(&leaf).unwrap();
+    let (shaders, leaf, original) = exported(folder.path());
     let watch = Watch::start(&["--hang", "20s", "--spp", "64"], &shaders);
     watch.expect(&["start:", "64 spp"]);
     // The loop over samples never ends. (lavapipe leaves any loop of a shader after 65535 rounds; the lane is then resumed.)
