@@ -7,7 +7,7 @@ import { Picture } from "./picture.js";
 import { Plot } from "./plot.js";
 import { showEdits, showFigures, showProblems, showStage } from "./report.js";
 import { $, state } from "./state.js";
-import { flushView, listCameras, listShown, showCommand, takeView } from "./view.js";
+import { flushView, listCameras, listShown, showCommand, takeView, unusual } from "./view.js";
 
 const picture = new Picture($("picture"));
 const plot = new Plot($("plot"), $("key"));
@@ -53,7 +53,7 @@ async function received(buffer) {
   if (last && about.start < last.start && about.edit === last.edit) return bitmap.close();
   state.frame = about;
   picture.show(bitmap, about.moving ? state.resolution : [about.width, about.height]);
-  plot.add(about);
+  plot.add(about, unusual());
   showFigures(about);
   showCounts(about);
   showShown(about);

@@ -17,12 +17,12 @@ export class Plot {
     this.draw();
   }
 
-  /** A new line where rendering has started anew; the one before of the same edit and view is done with. */
-  add(frame) {
+  /** A new line where rendering has started anew; `label` says what of the view is not as usual. */
+  add(frame, label) {
     if (frame.moving || !(frame.error > 0) || !(frame.seconds > 0)) return;
     let last = this.series.at(-1);
     if (!last || last.start !== frame.start || last.edit !== frame.edit) {
-      last = { edit: frame.edit, start: frame.start, points: [] };
+      last = { edit: frame.edit, start: frame.start, label, points: [] };
       const older = this.series.filter((s) => s.points.length > 1);
       const [before, others] = [older.filter((s) => s === this.before), older.filter((s) => s !== this.before)];
       this.series = [...before, ...others.slice(1 + before.length - SHOWN), last];
@@ -79,7 +79,8 @@ export class Plot {
       const entry = document.createElement("span");
       entry.style.color = COLOURS[this.series.length - 1 - i];
       const names = [series === this.before && "A", i === this.series.length - 1 && "now"].filter(Boolean);
-      entry.textContent = names.length > 0 ? `${names.join(", ")} (edit ${series.edit})` : `edit ${series.edit}`;
+      const edit = [`edit ${series.edit}`, series.label].filter(Boolean).join(" ");
+      entry.textContent = names.length > 0 ? `${names.join(", ")} (${edit})` : edit;
       return entry;
     }));
   }

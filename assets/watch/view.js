@@ -105,8 +105,23 @@ function command() {
   return [...base, ...flags.map(([name, value]) => (value === true ? `--${name}` : `--${name}=${value}`))].join(" ");
 }
 
+/** What of the view decides how fast it converges and is not as usual, in words. */
+export function unusual() {
+  const { view } = state;
+  const named = ["integrator", "light_sampling", "mis", "sampler"].filter((field) => view[field] !== DEFAULTS[field.replaceAll("_", "-")]);
+  const words = named.map((field) => view[field]);
+  if (view.max_bounces !== null) words.push(`${view.max_bounces} bounces`);
+  if (view.camera !== 0 || view.pose) words.push("another view");
+  if (view.shown) words.push("AOVs");
+  if (view.statistics) words.push("counted");
+  return words.join(" ");
+}
+
 export function showCommand() {
-  if (state.status && state.view) $("command").textContent = command();
+  if (!state.status || !state.view) return;
+  // Lines break between words, not at hyphens.
+  const words = command().split(" ").map((word) => Object.assign(document.createElement("span"), { textContent: word }));
+  $("command").replaceChildren(...words.flatMap((word) => [" ", word]).slice(1));
 }
 
 $("png").onclick = () => say({ type: "save", format: "png" });

@@ -45,6 +45,13 @@ const step = async (name, work) => {
   console.log(`ok  ${name} (${figures[name]} ms)`);
 };
 
+// Ticks (1/100 s) of processor time of a process and its children, on Linux.
+const ticks = (pid) => {
+  const [, , ...stat] = readFileSync(`/proc/${pid}/stat`, "utf8").replace(/^\d+ \(.*\)/, "x x").split(" ");
+  const children = readFileSync(`/proc/${pid}/task/${pid}/children`, "utf8").trim().split(" ").filter(Boolean);
+  return Number(stat[11]) + Number(stat[12]) + children.reduce((sum, child) => sum + ticks(child), 0);
+};
+
 let browser;
 try {
   browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
@@ -75,6 +82,15 @@ try {
   await step("finish", finished);
   await shot("large");
   const before = await mean();
+  if (process.platform === "linux") {
+    await step("a finished picture uses no processor time", async () => {
+      await page.waitForTimeout(300);
+      const start = ticks(child.pid);
+      await page.waitForTimeout(1000);
+      const used = ticks(child.pid) - start;
+      assert(used <= 1, `${used} ticks of 10 ms in a second`);
+    });
+  }
 
   await step("freeze A", async () => {
     await page.keyboard.press("f");
