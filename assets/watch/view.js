@@ -4,7 +4,7 @@
 import { $, say, state } from "./state.js";
 
 /** Controls whose value is a word of the view. */
-const NAMED = { integrator: "integrator", light_sampling: "light-sampling", mis: "mis", sampler: "sampler", tonemap: "tonemap", shown: "shown" };
+const NAMED = { integrator: "integrator", light_sampling: "light-sampling", mis: "mis", light_choice: "light-choice", env_sampling: "env-sampling", sampler: "sampler", tonemap: "tonemap", shown: "shown" };
 
 let waiting = false;
 let dirty = false;
@@ -86,6 +86,7 @@ function showExposure() {
 /** What `render` does unless it is told otherwise. */
 const DEFAULTS = {
   camera: 0, exposure: 0, tonemap: "clip", integrator: "path", "light-sampling": "mis", mis: "power", sampler: "sobol",
+  "light-choice": "bvh", "env-sampling": "importance",
   "max-bounces": null, "look-at": null, aov: "", stats: false,
 };
 
@@ -108,7 +109,7 @@ function command() {
 /** What of the view decides how fast it converges and is not as usual, in words. */
 export function unusual() {
   const { view } = state;
-  const named = ["integrator", "light_sampling", "mis", "sampler"].filter((field) => view[field] !== DEFAULTS[field.replaceAll("_", "-")]);
+  const named = ["integrator", "light_sampling", "mis", "light_choice", "env_sampling", "sampler"].filter((field) => view[field] !== DEFAULTS[field.replaceAll("_", "-")]);
   const words = named.map((field) => view[field]);
   if (view.max_bounces !== null) words.push(`${view.max_bounces} bounces`);
   if (view.camera !== 0 || view.pose) words.push("another view");

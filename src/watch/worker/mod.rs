@@ -197,7 +197,7 @@ impl Worker {
         };
         if old.estimator != self.view.estimator || self.key_of_view()? != self.aim {
             // What is in front goes on, with its own camera and estimator, until the other kernel is there.
-            self.order(self.edit, false)?;
+            self.order(self.edit, old.estimator.prepares_otherwise(&self.view.estimator))?;
         }
         let camera = self.fitting_camera()?.unwrap_or(self.camera);
         if self.camera != camera || (old.pose, old.moving) != (self.view.pose, self.view.moving) {
