@@ -8,7 +8,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 sunfleck="${CARGO_TARGET_DIR:-target}/release/sunfleck"
 modules="${XDG_CACHE_HOME:-$HOME/.cache}/sunfleck/e2e"
-playwright=playwright-core@1
+# Runs with Debian 12's node, 18; later ones want 20.
+playwright=playwright-core@1.57.0
 skip=""
 if [ "${1:-}" = --skip ]; then
     skip=yes
@@ -56,12 +57,12 @@ have node || missing "there is no node"
 CHROMIUM=$(find_chromium) || missing "there is no chromium"
 export CHROMIUM
 export NODE_PATH="$modules/node_modules${NODE_PATH:+:$NODE_PATH}"
-find_playwright() { node -e 'require.resolve("playwright-core")' 2>/dev/null; }
+find_playwright() { node -e 'require("playwright-core")' >/dev/null 2>&1; }
 if ! find_playwright; then
     have npm || missing "there is no npm to install $playwright with"
     mkdir -p "$modules"
     npm install --silent --no-fund --no-audit --prefix "$modules" "$playwright" || missing "npm cannot install $playwright"
-    find_playwright || missing "$playwright is not found where npm has put it"
+    find_playwright || missing "$playwright does not run where npm has put it"
 fi
 [ -x "$sunfleck" ] || missing "$sunfleck is not built"
 exec node tests/e2e/watch.mjs "$sunfleck" "$@"

@@ -2,11 +2,12 @@
 
 import { listen } from "./input.js";
 import { inspectPinned, placeMark, showPixel, showPrints } from "./inspect.js";
+import { showCounts, showKernel, showShown } from "./kernel.js";
 import { Picture } from "./picture.js";
 import { Plot } from "./plot.js";
 import { showEdits, showFigures, showProblems, showStage } from "./report.js";
 import { $, state } from "./state.js";
-import { flushView, listCameras, showCommand, takeView } from "./view.js";
+import { flushView, listCameras, listShown, showCommand, takeView, unusual } from "./view.js";
 
 const picture = new Picture($("picture"));
 const plot = new Plot($("plot"), $("key"));
@@ -29,12 +30,14 @@ function told(message) {
     $("scene").textContent = message.ready.scene;
     $("scene").title = message.ready.device;
     listCameras(message.ready.cameras);
+    listShown(message.ready.aovs);
   }
   if (!state.view) takeView(message.view);
   $("debug-row").hidden = !message.has_debug_pixel;
   showStage(message);
   showProblems(message);
   showEdits(message);
+  showKernel(message);
   showPrints(message.prints);
   showCommand();
 }
@@ -50,8 +53,10 @@ async function received(buffer) {
   if (last && about.start < last.start && about.edit === last.edit) return bitmap.close();
   state.frame = about;
   picture.show(bitmap, about.moving ? state.resolution : [about.width, about.height]);
-  plot.add(about);
+  plot.add(about, unusual());
   showFigures(about);
+  showCounts(about);
+  showShown(about);
   document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   document.body.dataset.edit = about.edit;
   document.body.dataset.start = about.start;
@@ -79,6 +84,7 @@ function compare(mode = $("compare").value) {
 
 $("freeze").onclick = async () => {
   await picture.freeze();
+  plot.freeze();
   $("compare").disabled = $("wipe").disabled = !picture.frozen;
 };
 $("compare").onchange = () => compare();

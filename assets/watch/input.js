@@ -6,7 +6,7 @@ import { $, pose, state } from "./state.js";
 import { move } from "./view.js";
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-const BUTTONS = { f: "freeze", r: "reset", s: "png", v: "debug" };
+const BUTTONS = { f: "freeze", r: "reset", s: "png", v: "debug", c: "statistics" };
 const MODES = { w: "wipe", d: "difference", h: "heat", a: "a", b: "b" };
 
 /** `compare(mode)` changes what is shown of before and after. */
@@ -60,5 +60,10 @@ export function listen(picture, compare) {
     // What is not there cannot be pressed.
     if (BUTTONS[key]) return $(BUTTONS[key]).offsetParent && $(BUTTONS[key]).click();
     if (MODES[key] && picture.frozen) compare(MODES[key]);
+    const shown = $("shown").options[/^\d$/.test(key) ? Number(key) : -1];
+    if (shown) {
+      $("shown").value = shown.value;
+      $("shown").dispatchEvent(new Event("change"));
+    }
   });
 }

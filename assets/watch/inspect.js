@@ -34,7 +34,7 @@ export function placeMark(picture) {
   style.width = style.height = `${size}px`;
 }
 
-export function showPixel({ x, y, radiance, samples, variance, seen }) {
+export function showPixel({ x, y, radiance, samples, variance, seen, aovs }) {
   const number = (value) => (value === null ? "not finite" : Number(value).toPrecision(5));
   $("pixel-place").textContent = `${x}, ${y}${state.pinned ? " (pinned)" : ""}`;
   $("pixel-radiance").textContent = radiance.map(number).join("  ");
@@ -44,6 +44,12 @@ export function showPixel({ x, y, radiance, samples, variance, seen }) {
   $("pixel-mesh").textContent = seen ? (seen.instance === seen.mesh ? seen.mesh : `${seen.mesh} in ${seen.instance}`) : "–";
   $("pixel-triangle").textContent = seen ? `${seen.triangle} of primitive ${seen.primitive}` : "–";
   $("pixel-distance").textContent = seen ? `${seen.distance.toPrecision(5)} m` : "–";
+  $("pixel-aovs").replaceChildren(...aovs.flatMap(([name, values]) => {
+    const [term, value] = [document.createElement("dt"), document.createElement("dd")];
+    term.textContent = name;
+    value.textContent = values.map(number).join("  ");
+    return [term, value];
+  }));
 }
 
 /** What shaders give to DEBUG_PRINT. */

@@ -8,15 +8,24 @@ export class Plot {
     this.canvas = canvas;
     this.key = key;
     this.series = [];
+    /** What was under way when A was frozen; it stays. */
+    this.before = null;
   }
 
-  /** A new line where rendering has started anew; the one before of the same edit and view is done with. */
-  add(frame) {
+  freeze() {
+    this.before = this.series.at(-1) ?? null;
+    this.draw();
+  }
+
+  /** A new line where rendering has started anew; `label` says what of the view is not as usual. */
+  add(frame, label) {
     if (frame.moving || !(frame.error > 0) || !(frame.seconds > 0)) return;
     let last = this.series.at(-1);
     if (!last || last.start !== frame.start || last.edit !== frame.edit) {
-      last = { edit: frame.edit, start: frame.start, points: [] };
-      this.series = [...this.series.filter((s) => s.points.length > 1), last].slice(-SHOWN);
+      last = { edit: frame.edit, start: frame.start, label, points: [] };
+      const older = this.series.filter((s) => s.points.length > 1);
+      const [before, others] = [older.filter((s) => s === this.before), older.filter((s) => s !== this.before)];
+      this.series = [...before, ...others.slice(1 + before.length - SHOWN), last];
     }
     last.points.push([frame.seconds, frame.error]);
     this.draw();
@@ -62,12 +71,16 @@ export class Plot {
       context.lineWidth = i === this.series.length - 1 ? 2 : 1.2;
       context.beginPath();
       for (const [s, e] of series.points) context.lineTo(px(s), py(e));
+      context.setLineDash(series === this.before ? [5, 3] : []);
       context.stroke();
     });
+    context.setLineDash([]);
     this.key.replaceChildren(...this.series.map((series, i) => {
       const entry = document.createElement("span");
       entry.style.color = COLOURS[this.series.length - 1 - i];
-      entry.textContent = i === this.series.length - 1 ? `now (edit ${series.edit})` : `edit ${series.edit}`;
+      const names = [series === this.before && "A", i === this.series.length - 1 && "now"].filter(Boolean);
+      const edit = [`edit ${series.edit}`, series.label].filter(Boolean).join(" ");
+      entry.textContent = names.length > 0 ? `${names.join(", ")} (${edit})` : edit;
       return entry;
     }));
   }

@@ -4,7 +4,7 @@
 import { $, say, state } from "./state.js";
 
 /** Controls whose value is a word of the view. */
-const NAMED = { integrator: "integrator", light_sampling: "light-sampling", mis: "mis", sampler: "sampler", tonemap: "tonemap" };
+const NAMED = { integrator: "integrator", light_sampling: "light-sampling", mis: "mis", light_choice: "light-choice", env_sampling: "env-sampling", sampler: "sampler", tonemap: "tonemap", shown: "shown" };
 
 let waiting = false;
 let dirty = false;
@@ -39,6 +39,7 @@ export function takeView(view) {
   $("max-bounces").value = view.max_bounces ?? "";
   $("exposure").value = view.exposure;
   $("debug").checked = view.debug;
+  $("statistics").checked = view.statistics;
   state.pinned = view.pixel;
   showExposure();
 }
@@ -52,6 +53,14 @@ export function listCameras(cameras) {
   select.value = state.view?.camera ?? state.status.view.camera;
 }
 
+/** Light, and the AOVs that the device can give. */
+export function listShown(aovs) {
+  const select = $("shown");
+  if (select.options.length === aovs.length + 1) return;
+  select.replaceChildren(new Option("light", ""), ...aovs.map((name) => new Option(name, name)));
+  select.value = state.view?.shown ?? state.status.view.shown;
+}
+
 for (const [field, id] of Object.entries(NAMED)) {
   $(id).onchange = (event) => changeView({ [field]: event.target.value });
 }
@@ -60,6 +69,7 @@ $("max-bounces").onchange = (event) => {
   const { value, validity } = event.target;
   if (validity.valid) changeView({ max_bounces: value === "" ? null : Number(value) });
 };
+$("statistics").onchange = (event) => changeView({ statistics: event.target.checked });
 $("debug").onchange = (event) => changeView({ debug: event.target.checked });
 $("exposure").oninput = (event) => {
   changeView({ exposure: Number(event.target.value) });
@@ -73,20 +83,46 @@ function showExposure() {
 
 // ---- The command that renders this view
 
+/** What `render` does unless it is told otherwise. */
+const DEFAULTS = {
+  camera: 0, exposure: 0, tonemap: "clip", integrator: "path", "light-sampling": "mis", mis: "power", sampler: "sobol",
+  "light-choice": "bvh", "env-sampling": "importance",
+  "max-bounces": null, "look-at": null, aov: "", stats: false,
+};
+
 function command() {
   const { view, status } = state;
-  const own = ["camera", "exposure", ...Object.values(NAMED), "max-bounces"];
-  const flags = own.filter((name) => name !== "max-bounces" || view.max_bounces !== null).map((name) => {
-    const field = name.replaceAll("-", "_");
-    return `--${name}=${view[field]}`;
-  });
-  const base = status.command.split(" ").filter((word) => !own.some((name) => word.startsWith(`--${name}=`)));
-  const moved = view.pose ? "  # the camera was moved here: render takes the scene's own" : "";
-  return [...base, ...flags].join(" ") + moved;
+  const { pose } = view;
+  const words = status.command.split(" ");
+  const kept = words.find((word) => word.startsWith("--aov="))?.slice(6).split(",") ?? [];
+  const values = {
+    ...Object.fromEntries(Object.keys(DEFAULTS).map((name) => [name, view[name.replaceAll("-", "_")] ?? null])),
+    "look-at": pose && [pose.eye, pose.target, pose.up].map((point) => point.join(",")).join(":"),
+    aov: [...new Set([...kept, view.shown].filter(Boolean))].join(","),
+    stats: view.statistics,
+  };
+  const flags = Object.entries(values).filter(([name, value]) => value !== DEFAULTS[name]);
+  const base = words.filter((word) => !Object.keys(DEFAULTS).some((name) => word.startsWith(`--${name}=`)));
+  return [...base, ...flags.map(([name, value]) => (value === true ? `--${name}` : `--${name}=${value}`))].join(" ");
+}
+
+/** What of the view decides how fast it converges and is not as usual, in words. */
+export function unusual() {
+  const { view } = state;
+  const named = ["integrator", "light_sampling", "mis", "light_choice", "env_sampling", "sampler"].filter((field) => view[field] !== DEFAULTS[field.replaceAll("_", "-")]);
+  const words = named.map((field) => view[field]);
+  if (view.max_bounces !== null) words.push(`${view.max_bounces} bounces`);
+  if (view.camera !== 0 || view.pose) words.push("another view");
+  if (view.shown) words.push("AOVs");
+  if (view.statistics) words.push("counted");
+  return words.join(" ");
 }
 
 export function showCommand() {
-  if (state.status && state.view) $("command").textContent = command();
+  if (!state.status || !state.view) return;
+  // Lines break between words, not at hyphens.
+  const words = command().split(" ").map((word) => Object.assign(document.createElement("span"), { textContent: word }));
+  $("command").replaceChildren(...words.flatMap((word) => [" ", word]).slice(1));
 }
 
 $("png").onclick = () => say({ type: "save", format: "png" });

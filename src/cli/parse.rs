@@ -5,6 +5,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use sunfleck::watch::messages::Pose;
 
 /// Film sums are 40 bytes a pixel on the host; 2²⁸ pixels are 10 GiB of them.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -21,6 +22,25 @@ where
 pub(crate) fn pixel(text: &str) -> Result<[u32; 2], String> {
     let read = |(x, y): (&str, &str)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]);
     text.split_once(',').and_then(read).ok_or_else(|| "a pixel is X,Y in whole numbers, as 256,128".to_owned())
+}
+
+/// `EYE:TARGET` or `EYE:TARGET:UP`, each `X,Y,Z`.
+pub(crate) fn look_at(text: &str) -> Result<Pose, String> {
+    let point = |text: &str| {
+        let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+        <[f64; 3]>::try_from(numbers?).ok()
+    };
+    let points: Option<Vec<[f64; 3]>> = text.split(':').map(point).collect();
+    let (eye, target, up) = match points.as_deref() {
+        Some(&[eye, target]) => (eye, target, [0.0, 1.0, 0.0]),
+        Some(&[eye, target, up]) => (eye, target, up),
+        _ => return Err("expected EYE:TARGET or EYE:TARGET:UP, each X,Y,Z, as in 0,1,4:0,1,0".to_owned()),
+    };
+    let pose = Pose { eye, target, up };
+    let is_frame = pose.camera_to_world().is_some();
+    is_frame
+        .then_some(pose)
+        .ok_or_else(|| "eye, target and up make no camera: two are at one place or in line".to_owned())
 }
 
 /// `1280x720`.

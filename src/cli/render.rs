@@ -7,14 +7,14 @@ use std::time::Instant;
 use anyhow::Context;
 use sunfleck::Error;
 use sunfleck::film::Film;
-use sunfleck::film::aov::{Aov, AovFilm};
+use sunfleck::film::aov::Aov;
 use sunfleck::film::aov_picture::aov_picture;
 use sunfleck::film::exr::ExrImage;
 use sunfleck::film::metadata::{Metadata, REC709_CHROMATICITIES, software};
 use sunfleck::film::output::ImageFormat;
 use sunfleck::film::png::{tone_map_srgb8, write_png};
-use sunfleck::film::tev::TevViewer;
-use sunfleck::render::{RenderResult, Settings, StopReason, open_device, render_on};
+use sunfleck::film::tev_feed::{TevFeed, TevNews};
+use sunfleck::render::{RenderResult, Settings, StopReason, choose_camera, open_device, render_on};
 use sunfleck::scene::{Environment, Scene, load};
 
 use super::estimator_args::EnvironmentArgs;
@@ -27,9 +27,13 @@ use super::{interrupt, print_json, print_warnings};
 /// Renders the job and writes its images.
 pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
     let loading = Instant::now();
-    let scene = load_scene(&job.scene, &job.environment, job.quiet)?;
+    let mut scene = load_scene(&job.scene, &job.environment, job.quiet)?;
+    if let Some(to_world) = job.look_at.and_then(|pose| pose.camera_to_world()) {
+        let camera = choose_camera(&scene, job.settings.camera.as_deref())?;
+        scene.cameras[camera].camera_to_world = to_world;
+    }
     let load_seconds = loading.elapsed().as_secs_f64();
-    let mut viewer = job.tev.as_deref().map(|address| connect(address, &scene)).transpose()?;
+    let viewer = job.tev.as_deref().map(|address| connect(address, &scene)).transpose()?;
     let device = open_device(&job.settings)?;
     if !job.quiet {
         eprintln!("device: {}, {}", device.reason, device.gpu.info.driver);
@@ -38,36 +42,31 @@ pub(crate) fn run(job: RenderJob) -> anyhow::Result<()> {
     let mut progress = Progress::new(job.quiet);
     let result = render_on(&device, &scene, &job.settings, &mut |update| {
         progress.show(update);
-        if let Some(run) = update.run.filter(|_| viewer.as_ref().is_some_and(TevViewer::is_due)) {
-            show(&mut viewer, &run.film, run.aovs.as_ref());
+        if let (Some(viewer), Some(run)) = (viewer.as_ref().filter(|viewer| viewer.is_due()), update.run) {
+            viewer.show(&run.film, run.aovs.as_ref());
         }
         if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     progress.finish();
     let mut result = result?;
-    show(&mut viewer, &result.film, result.aovs.as_ref());
+    if let Some(viewer) = viewer {
+        viewer.show(&result.film, result.aovs.as_ref());
+        viewer.finish();
+    }
     result.seconds.load = load_seconds;
     finish(&job, &scene, result)
 }
 
-fn connect(address: &str, scene: &Scene) -> anyhow::Result<TevViewer> {
-    TevViewer::connect(address, &scene.name).map_err(|error| {
+fn connect(address: &str, scene: &Scene) -> anyhow::Result<TevFeed> {
+    let said = |news: &TevNews| {
+        if let TevNews::Lost(error) = news {
+            eprintln!("warning: tev: {error}; the render goes on without it");
+        }
+    };
+    TevFeed::connect(address, &scene.name, said).map_err(|error| {
         let message = format!("cannot be reached: {error}; start tev first, or leave --tev out");
         Error::input(Path::new(&format!("--tev {address}")), message).into()
     })
-}
-
-/// Shows the image so far. A viewer that has gone away, or does not keep up, is given up.
-fn show(viewer: &mut Option<TevViewer>, film: &Film, aovs: Option<&AovFilm>) {
-    let Some(shown) = viewer else { return };
-    let mut image = ExrImage::from_film(film, Metadata::default());
-    if let Some(aovs) = aovs {
-        aovs.push_layers(film, &mut image);
-    }
-    if let Err(error) = shown.show(&image) {
-        eprintln!("warning: tev: {error}; the render goes on without it");
-        *viewer = None;
-    }
 }
 
 /// Writes and reports a result, and judges it.
@@ -210,6 +209,7 @@ mod tests {
             scene: "cornell".to_owned(),
             outputs: vec![(folder.join("a.exr"), ImageFormat::Exr), (folder.join("a.png"), ImageFormat::Png)],
             aov_pictures: Vec::new(),
+            look_at: None,
             settings: Settings { width: 2, height: 1, seed: 3, ..Settings::default() },
             environment: EnvironmentArgs { file: None, strength: 1.0, rotation_degrees: 0.0 },
             exposure_ev: 0.0,

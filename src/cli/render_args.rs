@@ -10,6 +10,7 @@ use sunfleck::film::aov_picture::picture_path;
 use sunfleck::film::output::{ImageFormat, check_writable};
 use sunfleck::film::tonemap::ToneMap;
 use sunfleck::render::{PixelFilter, Settings};
+use sunfleck::watch::messages::Pose;
 use sunfleck::{Error, Result};
 
 use super::estimator_args::{EnvironmentArgs, EstimatorArgs};
@@ -45,6 +46,9 @@ pub(crate) struct RenderArgs {
     /// Camera of the scene, by name or index [default: the first].
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Image")]
     camera: Option<String>,
+    /// Put that camera elsewhere: where it is, what it looks at, what is up in the image (else 0,1,0); world space, metres.
+    #[arg(long, value_name = "EYE:TARGET[:UP]", allow_hyphen_values = true, value_parser = parse::look_at, help_heading = "Image")]
+    look_at: Option<Pose>,
     #[command(flatten)]
     tone: ToneArgs,
     /// Pixel filter.
@@ -116,6 +120,8 @@ pub(crate) struct RenderJob {
     pub(crate) aov_pictures: Vec<(PathBuf, Aov)>,
     /// What the library needs to know.
     pub(crate) settings: Settings,
+    /// Where the camera is put.
+    pub(crate) look_at: Option<Pose>,
     /// Changes to the scene's environment.
     pub(crate) environment: EnvironmentArgs,
     /// Exposure steps of PNG outputs.
@@ -173,6 +179,7 @@ impl RenderArgs {
             environment,
             exposure_ev: self.tone.exposure,
             tone_map: self.tone.tonemap,
+            look_at: self.look_at,
             tev: self.tev,
             json: self.json,
             quiet: self.quiet,

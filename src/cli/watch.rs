@@ -5,8 +5,9 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::time::Duration;
 
 use clap::Args;
+use sunfleck::film::aov::Aov;
 use sunfleck::render::{Settings, choose_camera};
-use sunfleck::watch::messages::{Estimator, View};
+use sunfleck::watch::messages::{Estimator, Pose, View};
 use sunfleck::watch::session::{self, Options, Serving};
 use sunfleck::watch::worker;
 use sunfleck::{Error, Result};
@@ -35,6 +36,9 @@ pub(crate) struct WatchArgs {
     pub(super) job: WorkerArgs,
     #[command(flatten)]
     tone: ToneArgs,
+    /// Put that camera elsewhere at first: where it is, what it looks at, what is up in the image (else 0,1,0).
+    #[arg(long, value_name = "EYE:TARGET[:UP]", allow_hyphen_values = true, value_parser = parse::look_at, help_heading = "Image")]
+    look_at: Option<Pose>,
     /// Port of the page [default: 8417, or any that is free].
     #[arg(long, value_name = "N", help_heading = "Page")]
     port: Option<u16>,
@@ -68,6 +72,12 @@ pub(crate) struct WorkerArgs {
     /// Samples per pixel, after which the picture is finished and nothing runs.
     #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..), help_heading = "How long")]
     spp: u32,
+    /// AOVs to sum besides the image, for tev and for saved EXR files; the page can show every one without.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::named::<Aov>(Aov::NAMES), help_heading = "Image")]
+    aov: Vec<Aov>,
+    /// Show the image and the AOVs in the viewer tev whenever it listens there [port: 14158].
+    #[arg(long, value_name = "HOST[:PORT]", help_heading = "Image")]
+    tev: Option<String>,
     #[command(flatten)]
     pub(super) estimator: EstimatorArgs,
 }
@@ -79,14 +89,19 @@ impl WorkerArgs {
         if self.estimator.seed != 0 {
             words.push(format!("--seed={}", self.estimator.seed));
         }
+        if !self.aov.is_empty() {
+            let names: Vec<_> = self.aov.iter().map(|aov| aov.name()).collect();
+            words.push(format!("--aov={}", names.join(",")));
+        }
         words.extend(self.estimator.render_flags());
         words
     }
 
     fn settings(&self) -> Result<(Settings, super::estimator_args::EnvironmentArgs)> {
         let (width, height) = self.resolution;
+        let aovs = Aov::ALL.iter().copied().filter(|aov| self.aov.contains(aov)).collect();
         let mut settings =
-            Settings { width, height, spp: self.spp, camera: self.camera.clone(), ..Settings::default() };
+            Settings { width, height, spp: self.spp, camera: self.camera.clone(), aovs, ..Settings::default() };
         let environment = self.estimator.clone().apply(&mut settings)?;
         Ok((settings, environment))
     }
@@ -105,12 +120,13 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
         eprintln!("page: http://{}{query}", serving.address);
     }
     let words = args.job.words();
-    let quoted: Vec<_> = words.iter().map(|word| shlex::try_quote(word).unwrap_or_default().into_owned()).collect();
-    let scene = shlex::try_quote(&args.job.scene).unwrap_or_default().into_owned();
+    let quoted: Vec<_> = words.iter().map(|word| quote(word)).collect();
+    let scene = quote(&args.job.scene);
     // The server compiles: the worker starts with the embedded kernel, which is always good.
     let worker = words.iter().filter(|word| !word.starts_with("--shaders=")).map(OsString::from);
     let mut worker_arguments: Vec<OsString> = vec!["watch-worker".into()];
     worker_arguments.extend(worker);
+    worker_arguments.extend(args.job.tev.iter().map(|address| format!("--tev={address}").into()));
     worker_arguments.extend([format!("--spp={}", args.job.spp).into(), "--".into(), args.job.scene.clone().into()]);
     let options = Options {
         scene: args.job.scene.clone(),
@@ -124,6 +140,7 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
             tonemap: args.tone.tonemap.to_string(),
             debug: !args.no_serve,
             pixel: args.pixel,
+            pose: args.look_at,
             ..View::default()
         },
         command: format!("sunfleck render {scene} {}", quoted.join(" ")),
@@ -137,10 +154,19 @@ pub(crate) fn run_worker(args: &WorkerArgs) -> anyhow::Result<()> {
     let (settings, environment) = args.settings()?;
     let scene = args.scene.clone();
     let load = move || load_scene(&scene, &environment, true).map_err(|error| format!("{error:#}"));
-    match worker::run(settings, Box::new(load)) {
+    match worker::run(settings, Box::new(load), args.tev.as_deref()) {
         // The server is gone.
         Err(Error::Interrupted) => Ok(()),
         result => Ok(result?),
+    }
+}
+
+/// A word for a shell; of `--name=value` the value alone is quoted, if it must be.
+fn quote(word: &str) -> String {
+    let quoted = |text| shlex::try_quote(text).unwrap_or_default().into_owned();
+    match word.split_once('=') {
+        Some((flag, value)) if flag.starts_with("--") => format!("{flag}={}", quoted(value)),
+        _ => quoted(word),
     }
 }
 

@@ -90,6 +90,19 @@ impl AovFilm {
         self.layers.iter().map(|(aov, _)| *aov)
     }
 
+    /// Adds the samples of another film of the same AOVs, which follow this one's.
+    ///
+    /// # Panics
+    /// If they differ in their AOVs or sizes.
+    pub fn merge(&mut self, other: &Self) {
+        assert!(self.aovs().eq(other.aovs()) && self.hits.len() == other.hits.len(), "AOVs of different films");
+        let add = |mine: &mut [f64], theirs: &[f64]| mine.iter_mut().zip(theirs).for_each(|(a, b)| *a += b);
+        add(&mut self.hits, &other.hits);
+        for ((_, mine), (_, theirs)) in self.layers.iter_mut().zip(&other.layers) {
+            add(mine, theirs);
+        }
+    }
+
     /// Adds the sums of a block of samples; blocks of a pixel come in the order of their sample indices, as those of
     /// [`Film::add_block`].
     ///
@@ -113,6 +126,19 @@ impl AovFilm {
     /// Means over the samples that met a surface; 0 where none did.
     pub fn means_of_hits(&self, aov: Aov) -> Option<Vec<Vec<f64>>> {
         self.over(aov, |pixel| self.hits[pixel])
+    }
+
+    /// The means of one pixel over its samples, AOV by AOV; none without samples.
+    ///
+    /// # Panics
+    /// If `pixel` is outside the image.
+    pub fn pixel_means(&self, pixel: usize, film: &Film) -> Vec<(Aov, Vec<f64>)> {
+        let count = f64::from(film.pixels()[pixel].count);
+        let mean = |(aov, sums): &(Aov, Vec<f64>)| {
+            let channels = aov.channels().len();
+            (*aov, sums[pixel * channels..][..channels].iter().map(|sum| sum / count).collect())
+        };
+        if count > 0.0 { self.layers.iter().map(mean).collect() } else { Vec::new() }
     }
 
     /// Whether any sample of the pixel met a surface.

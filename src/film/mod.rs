@@ -12,6 +12,7 @@ pub mod output;
 pub mod png;
 pub mod replicates;
 pub mod tev;
+pub mod tev_feed;
 pub mod tonemap;
 
 /// Weights of linear Rec.709 red, green and blue in the luminance (ITU-R BT.709).

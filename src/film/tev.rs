@@ -1,8 +1,8 @@
-//! Shows an image in the viewer tev while it is rendered, by tev's protocol over TCP.
+//! A connection to the viewer tev, by its protocol over TCP. [`super::tev_feed`] keeps it out of the way of a render.
 
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
@@ -10,17 +10,17 @@ use super::exr::{ChannelValues, ExrImage};
 
 /// The port that tev listens on unless it is told otherwise.
 pub const DEFAULT_PORT: u16 = 14158;
-/// How long the viewer may take to connect, and to take each part of an image: it must not hold up the render.
+/// How long the viewer may take to connect, and to take each part of an image.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Time between two pictures.
-const INTERVAL: Duration = Duration::from_millis(500);
 
 /// A connection to a running tev, with one image in it.
 pub struct TevViewer {
     client: TevClient,
+    /// The client's socket, to ask whether the viewer is still there.
+    socket: TcpStream,
     name: String,
-    is_created: bool,
-    shown: Option<Instant>,
+    /// Size and channels of the image that the viewer was told to make.
+    made: Option<(u32, u32, Vec<String>)>,
 }
 
 impl TevViewer {
@@ -39,12 +39,24 @@ impl TevViewer {
         }
         let stream = outcome?;
         stream.set_write_timeout(Some(PATIENCE))?;
-        Ok(Self { client: TevClient::wrap(stream), name: name.to_owned(), is_created: false, shown: None })
+        let socket = stream.try_clone()?;
+        Ok(Self { client: TevClient::wrap(stream), socket, name: name.to_owned(), made: None })
     }
 
-    /// Whether the last picture is long enough ago for another.
-    pub fn is_due(&self) -> bool {
-        self.shown.is_none_or(|shown| shown.elapsed() >= INTERVAL)
+    /// Whether the connection still stands, as far as can be told without sending anything.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn check(&self) -> io::Result<()> {
+        self.socket.set_nonblocking(true)?;
+        // The viewer never says anything: there is nothing to read, or the end.
+        let peeked = self.socket.peek(&mut [0]);
+        self.socket.set_nonblocking(false)?;
+        match peeked {
+            Ok(0) => Err(io::ErrorKind::ConnectionReset.into()),
+            Err(error) if error.kind() != io::ErrorKind::WouldBlock => Err(error),
+            _ => Ok(()),
+        }
     }
 
     /// Shows the image's channels of floats: radiance, variance and AOVs by the names that they have in EXR files.
@@ -62,11 +74,13 @@ impl TevViewer {
             .collect();
         let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
         let (width, height) = (image.width, image.height);
-        if !self.is_created {
-            let packet =
-                PacketCreateImage { image_name: &self.name, grab_focus: true, width, height, channel_names: &names };
+        let wanted = (width, height, names.iter().map(|&name| name.to_owned()).collect());
+        if self.made.as_ref() != Some(&wanted) {
+            // Takes the place of an image of that name.
+            let grab_focus = self.made.is_none();
+            let packet = PacketCreateImage { image_name: &self.name, grab_focus, width, height, channel_names: &names };
             self.client.send(packet)?;
-            self.is_created = true;
+            self.made = Some(wanted);
         }
         let pixels = u64::from(width) * u64::from(height);
         let offsets: Vec<u64> = (0..names.len() as u64).map(|index| index * pixels).collect();
@@ -82,9 +96,7 @@ impl TevViewer {
             width,
             height,
             data: &data,
-        })?;
-        self.shown = Some(Instant::now());
-        Ok(())
+        })
     }
 }
 

@@ -116,8 +116,7 @@ impl PathTracer {
         )?;
         let slice_atoms = overrides.slice_atoms.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
         let mut key = KernelKey::new(prepared, camera, settings, buffers.trace, buffers.form);
-        let slices: Result<Vec<_>> = (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, slice_atoms, &key)).collect();
-        let mut slices = slices?;
+        let mut slices = new_slices(gpu, slice_atoms, &key)?;
         let start = Instant::now();
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
@@ -149,20 +148,27 @@ impl PathTracer {
     }
 
     /// Builds the kernel anew, for other settings or shaders, and keeps the scene on the device. `prepared` is the scene
-    /// that was uploaded; AOVs and statistics stay those that it was made for. On an error the tracer is as it was.
+    /// that was uploaded. On an error the tracer is as it was.
     ///
     /// # Errors
-    /// A shader that does not compile, a lost device.
+    /// A shader that does not compile, an AOV that the back end cannot give, a lost device.
     pub fn rebuild(&mut self, prepared: &Prepared, camera: &Camera, settings: &Settings) -> Result<()> {
+        check_aovs(&settings.aovs, self.buffers.trace)?;
         let start = Instant::now();
         let gpu = &self.buffers.gpu;
         let mut key = self.key_for(prepared, camera, settings);
-        (key.aovs, key.statistics) = (self.key.aovs, self.key.statistics);
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
-        let kernel =
-            build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &self.constants_buffer, &self.slices)?;
-        self.slices[0].warm_up(&kernel)?;
+        // Other sums lie in other buffers.
+        let mut others = ((key.aovs, key.statistics) != (self.key.aovs, self.key.statistics))
+            .then(|| new_slices(gpu, self.slices[0].atoms(), &key))
+            .transpose()?;
+        let slices = others.as_ref().unwrap_or(&self.slices);
+        let kernel = build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &self.constants_buffer, slices)?;
+        others.as_mut().unwrap_or(&mut self.slices)[0].warm_up(&kernel)?;
         (self.key, self.kernel, self.bake) = (key, kernel, bake);
+        if let Some(slices) = others {
+            self.slices = slices;
+        }
         self.constants.max_bounces = effective_max_bounces(settings);
         self.constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
         self.compile_seconds = start.elapsed().as_secs_f64();
@@ -293,4 +299,8 @@ impl PathTracer {
     fn total_samples(&self, per_pixel: u32) -> u64 {
         u64::from(per_pixel) * u64::from(self.constants.width) * u64::from(self.constants.height)
     }
+}
+
+fn new_slices(gpu: &Arc<Gpu>, atoms: u32, key: &KernelKey) -> Result<Vec<Slice>> {
+    (0..SLICES_IN_FLIGHT).map(|_| Slice::new(gpu, atoms, key)).collect()
 }

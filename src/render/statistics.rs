@@ -52,6 +52,10 @@ pub struct Occupancy {
 }
 
 impl Occupancy {
+    fn plus(self, other: Self) -> Self {
+        Self { busy: self.busy + other.busy, lanes: self.lanes + other.lanes }
+    }
+
     /// The busy share; `None` if nothing ran.
     pub fn share(&self) -> Option<f64> {
         (self.lanes > 0).then(|| self.busy as f64 / self.lanes as f64)
@@ -143,6 +147,18 @@ impl Statistics {
             let words: &[u32] = bytemuck::cast_slice(std::slice::from_ref(lane));
             self.is_saturated |= words.contains(&u32::MAX);
         }
+    }
+
+    /// Adds what another run of the same kernel has counted.
+    pub fn merge(&mut self, other: &Self) {
+        self.camera = self.camera.plus(other.camera);
+        self.scattered = self.scattered.plus(other.scattered);
+        self.shadow = self.shadow.plus(other.shadow);
+        self.search = self.search.plus(other.search);
+        self.shading = self.shading.plus(other.shading);
+        self.slice_seconds.extend_from_slice(&other.slice_seconds);
+        self.dispatches += other.dispatches;
+        self.is_saturated |= other.is_saturated;
     }
 
     /// All rays.

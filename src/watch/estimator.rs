@@ -16,6 +16,10 @@ pub struct Estimator {
     pub mis: String,
     /// Name of a [`crate::render::SamplerKind`].
     pub sampler: String,
+    /// Name of a [`crate::render::LightChoice`]; the scene's tables depend on it.
+    pub light_choice: String,
+    /// Name of an [`crate::render::EnvironmentSampling`]; likewise.
+    pub env_sampling: String,
     /// Scattering events a path may have; `None` is unlimited.
     pub max_bounces: Option<u32>,
 }
@@ -28,6 +32,8 @@ impl Estimator {
             light_sampling: settings.light_sampling.name().to_owned(),
             mis: settings.mis_heuristic.name().to_owned(),
             sampler: settings.sampler.name().to_owned(),
+            light_choice: settings.light_choice.name().to_owned(),
+            env_sampling: settings.env_sampling.name().to_owned(),
             max_bounces: settings.max_bounces,
         }
     }
@@ -38,7 +44,14 @@ impl Estimator {
         Self::read(&mut settings.light_sampling, &self.light_sampling);
         Self::read(&mut settings.mis_heuristic, &self.mis);
         Self::read(&mut settings.sampler, &self.sampler);
+        Self::read(&mut settings.light_choice, &self.light_choice);
+        Self::read(&mut settings.env_sampling, &self.env_sampling);
         settings.max_bounces = self.max_bounces;
+    }
+
+    /// Whether the scene must be prepared anew for the other.
+    pub(super) fn prepares_otherwise(&self, other: &Self) -> bool {
+        (&self.light_choice, &self.env_sampling) != (&other.light_choice, &other.env_sampling)
     }
 
     fn read<T: std::str::FromStr>(target: &mut T, name: &str) {

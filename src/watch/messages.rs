@@ -23,6 +23,10 @@ pub struct View {
     pub tonemap: String,
     /// The picture is what shaders give to DEBUG_PIXEL, if any does.
     pub debug: bool,
+    /// Name of the [`crate::film::aov::Aov`] that is the picture; of any other name it is the light.
+    pub shown: String,
+    /// Rays and their searches are counted.
+    pub statistics: bool,
     /// The pixel (column, row) whose DEBUG_PRINT values are shown; `None` is the one in the middle.
     pub pixel: Option<[u32; 2]>,
 }
@@ -101,6 +105,10 @@ pub struct Ready {
     pub warnings: Vec<String>,
     /// Width and height of the whole image.
     pub resolution: [u32; 2],
+    /// Names of the AOVs that the device can give.
+    pub aovs: Vec<String>,
+    /// The key of the kernel that renders.
+    pub kernel: String,
 }
 
 /// What an image is like; the PNG follows.
@@ -128,6 +136,12 @@ pub struct Frame {
     pub done: bool,
     /// It was rendered while the camera moves.
     pub moving: bool,
+    /// The AOV that the picture shows; `None` is the light.
+    pub shown: Option<String>,
+    /// What the colours of an AOV span.
+    pub scale: Option<String>,
+    /// What was counted, a [`crate::render::StatisticsReport`].
+    pub statistics: Option<serde_json::Value>,
 }
 
 /// From the worker to the server.
@@ -146,6 +160,8 @@ pub enum FromWorker {
         edit: u32,
         /// Seconds that the driver and the scene's specialisation took.
         seconds: f64,
+        /// The kernel's key.
+        kernel: String,
     },
     /// An edit cannot be shown.
     Failed {
@@ -174,6 +190,8 @@ pub enum FromWorker {
         variance: Option<f64>,
         /// What is seen there.
         seen: Option<Seen>,
+        /// Name and mean of each AOV that is summed.
+        aovs: Vec<(String, Vec<f64>)>,
     },
     /// What the kernel prints for the first sample of a pixel.
     Prints {

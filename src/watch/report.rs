@@ -129,6 +129,9 @@ mod tests {
             non_finite: 0,
             done: false,
             moving: false,
+            shown: None,
+            scale: None,
+            statistics: None,
         }
     }
 

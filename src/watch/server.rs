@@ -22,6 +22,7 @@ const FILES: &[(&str, &str, &str)] = &[
     script("/camera.js", include_str!("../../assets/watch/camera.js")),
     script("/input.js", include_str!("../../assets/watch/input.js")),
     script("/inspect.js", include_str!("../../assets/watch/inspect.js")),
+    script("/kernel.js", include_str!("../../assets/watch/kernel.js")),
     script("/picture.js", include_str!("../../assets/watch/picture.js")),
     script("/plot.js", include_str!("../../assets/watch/plot.js")),
     script("/report.js", include_str!("../../assets/watch/report.js")),

@@ -10,3 +10,4 @@ mod shader_test;
 mod tev;
 mod usage;
 mod watch;
+mod watch_files;

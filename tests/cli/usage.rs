@@ -51,6 +51,8 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--env-strength", "-1", "not negative"),
         ("--env-rotation", "inf", "finite"),
         ("--exposure", "nan", "finite"),
+        ("--look-at", "0,0,1", "EYE:TARGET"),
+        ("--look-at", "0,0,1:0,0,0:0,0,1", "in line"),
         ("--tonemap", "filmic", "clip, exponential, reinhard, aces"),
         ("--trace", "rtx", "auto, ray-query, bvh"),
         ("--bvh-quality", "best", "fast, default, high"),

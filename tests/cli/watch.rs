@@ -25,16 +25,22 @@ fn exported(folder: &Path) -> (PathBuf, PathBuf, String) {
 }
 
 /// A running `sunfleck watch --no-serve`, killed when dropped.
-struct Watch {
+pub(crate) struct Watch {
     child: Child,
     lines: Receiver<String>,
 }
 
 impl Watch {
     fn start(arguments: &[&str], shaders: &Path) -> Self {
+        Self::of(Path::new("cornell"), &[&["--shaders", shaders.to_str().unwrap()], arguments].concat())
+    }
+
+    /// Watches a scene.
+    pub(crate) fn of(scene: &Path, arguments: &[&str]) -> Self {
         let mut child = sunfleck()
-            .args(["watch", "cornell", "--no-serve", "--resolution", "32x32", "--shaders"])
-            .arg(shaders)
+            .arg("watch")
+            .arg(scene)
+            .args(["--no-serve", "--resolution", "32x32"])
             .args(arguments)
             .stderr(Stdio::piped())
             .spawn()
@@ -46,7 +52,7 @@ impl Watch {
     }
 
     /// The next line with all of `words`, within two minutes: drivers compile slowly, machines are loaded.
-    fn expect(&self, words: &[&str]) -> String {
+    pub(crate) fn expect(&self, words: &[&str]) -> String {
         let start = Instant::now();
         let mut seen = Vec::new();
         while let Some(left) = Duration::from_secs(120).checked_sub(start.elapsed()) {

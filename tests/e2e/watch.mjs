@@ -45,6 +45,13 @@ const step = async (name, work) => {
   console.log(`ok  ${name} (${figures[name]} ms)`);
 };
 
+// Ticks (1/100 s) of processor time of a process and its children, on Linux.
+const ticks = (pid) => {
+  const [, , ...stat] = readFileSync(`/proc/${pid}/stat`, "utf8").replace(/^\d+ \(.*\)/, "x x").split(" ");
+  const children = readFileSync(`/proc/${pid}/task/${pid}/children`, "utf8").trim().split(" ").filter(Boolean);
+  return Number(stat[11]) + Number(stat[12]) + children.reduce((sum, child) => sum + ticks(child), 0);
+};
+
 let browser;
 try {
   browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
@@ -75,6 +82,15 @@ try {
   await step("finish", finished);
   await shot("large");
   const before = await mean();
+  if (process.platform === "linux") {
+    await step("a finished picture uses no processor time", async () => {
+      await page.waitForTimeout(300);
+      const start = ticks(child.pid);
+      await page.waitForTimeout(1000);
+      const used = ticks(child.pid) - start;
+      assert(used <= 1, `${used} ticks of 10 ms in a second`);
+    });
+  }
 
   await step("freeze A", async () => {
     await page.keyboard.press("f");
@@ -141,6 +157,7 @@ try {
       await page.mouse.move(box.x + box.width / 2 + 2 * i, box.y + box.height / 2 + i / 2);
       await page.waitForTimeout(25);
     }
+    assert.match(await page.textContent("#command"), / --look-at=[-\d.e,]+:[-\d.e,]+:[-\d.e,]+/);
     figures["images per second in a drag"] = ((await frames()) - count) / ((performance.now() - start) / 1000);
     await page.mouse.up();
     await page.waitForTimeout(500);
@@ -225,11 +242,11 @@ try {
   await step("other estimators", async () => {
     const light = await mean();
     const starts = () => page.evaluate(() => document.body.dataset.start);
-    for (const [id, value] of [["light-sampling", "bsdf"], ["light-sampling", "mis"], ["sampler", "independent"], ["sampler", "sobol"]]) {
+    for (const [id, value, isDefault] of [["light-sampling", "bsdf"], ["light-sampling", "mis", true], ["sampler", "independent"], ["sampler", "sobol", true], ["light-choice", "uniform"], ["light-choice", "bvh", true]]) {
       const before = await starts();
       await page.selectOption(`#${id}`, value);
       await page.waitForFunction((before) => document.body.dataset.start !== before, before, { timeout: 60000 });
-      assert((await page.textContent("#command")).includes(`--${id}=${value}`));
+      assert.equal((await page.textContent("#command")).includes(`--${id}=${value}`), !isDefault);
     }
     const before = await starts();
     await page.fill("#max-bounces", "1");
@@ -241,6 +258,37 @@ try {
     await page.keyboard.press("Tab");
     await page.waitForTimeout(1000);
     await finished();
+  });
+  await step("AOVs are the picture, and what is counted is shown", async () => {
+    const light = await mean();
+    const shown = (name) => page.waitForFunction((name) => document.body.dataset.shown === name, name, { timeout: 60000 });
+    await page.keyboard.press("2");
+    await shown("normal");
+    const [, , blue] = await mean();
+    assert(blue > 100, `the back wall's normal is +Z: ${await mean()}`);
+    await finished();
+    const start = await page.evaluate(() => document.body.dataset.start);
+    await page.keyboard.press("3");
+    await shown("depth");
+    assert.equal(await page.evaluate(() => document.body.dataset.start), start, "nothing is built or rendered for another AOV");
+    assert.match(await page.textContent("#scale"), /white [\d.]+ m/);
+    assert.match(await page.textContent("#command"), / --aov=depth/);
+    await page.waitForFunction(() => document.getElementById("pixel-aovs").textContent.includes("normal"));
+    await shot("depth");
+    await page.keyboard.press("c");
+    await page.waitForFunction(() => !document.getElementById("counts").hidden, null, { timeout: 60000 });
+    assert.match(await page.textContent("#counts-rays"), /camera.*shadow.*all/s);
+    assert.match(await page.textContent("#counts-lanes"), /\d %/);
+    await finished();
+    await page.evaluate(() => document.getElementById("counts").scrollIntoView({ block: "center" }));
+    await shot("counts");
+    await page.keyboard.press("c");
+    await page.keyboard.press("0");
+    await shown("light");
+    await page.waitForFunction((start) => document.body.dataset.start > start && document.getElementById("counts").hidden, start, { timeout: 60000 });
+    await finished();
+    const back = await mean();
+    assert(back.every((c, i) => Math.abs(c - light[i]) < 0.01), `the same light again: ${light} ${back}`);
   });
   await step("save", async () => {
     for (const [button, magic] of [["#png", "89504e47"], ["#exr", "762f3101"]]) {

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use crate::common::gpu;
 use crate::common::scenes::scene;
+use sunfleck::film::aov::Aov;
 use sunfleck::gpu::DeviceKind;
-use sunfleck::render::{BindingOverride, OpenDevice, PathTracer, prepare_scene};
+use sunfleck::render::{BindingOverride, OpenDevice, PathTracer, Settings, prepare_scene};
 
 fn bits(tracer: &mut PathTracer) -> Vec<[u64; 3]> {
     let run = tracer.run(5, 0..8, None, &mut |_| ControlFlow::Continue(())).expect("the device works");
@@ -40,6 +41,43 @@ fn a_tracer_beside_another_gives_the_same_image_while_that_renders() {
             thread.join().expect("no panic").expect("it is built")
         });
         assert!(bits(&mut behind) == reference, "the one that was built");
+    }
+    gpu::assert_no_validation_messages();
+}
+
+#[test]
+fn a_tracer_rebuilt_for_aovs_and_counters_has_them_and_without_again_the_same_image() {
+    let (scene, plain) = (scene("instances"), gpu::settings(40, 30));
+    let camera = &scene.cameras[0];
+    let prepared = prepare_scene(&scene, camera, &plain).expect("the scene fits");
+    let mut tracer = gpu::path_tracer(&scene, &plain);
+    let reference = bits(&mut tracer);
+    let counted = Settings { aovs: vec![Aov::Normal, Aov::Depth], statistics: true, ..plain.clone() };
+    for (settings, is_counted) in [(&counted, true), (&plain, false)] {
+        tracer.rebuild(&prepared, camera, settings).expect("it is built");
+        let run = tracer.run(0, 0..4, None, &mut |_| ControlFlow::Continue(())).expect("it runs");
+        assert_eq!((run.aovs.is_some(), run.statistics.is_some()), (is_counted, is_counted));
+        if let (Some(mut aovs), Some(mut statistics)) = (run.aovs, run.statistics) {
+            let normals = aovs.means(Aov::Normal, &run.film).expect("it is summed");
+            assert!(normals.iter().flatten().any(|&x| x != 0.0));
+            let (camera, before) = (statistics.camera.rays, aovs.clone());
+            assert_eq!(camera, 4 * 40 * 30);
+            // Joined with themselves, sums are twice as large.
+            aovs.merge(&before);
+            let mut film = run.film.clone();
+            film.merge(&run.film);
+            assert_eq!(aovs.means(Aov::Depth, &film), before.means(Aov::Depth, &run.film));
+            let pixel = &aovs.pixel_means(17, &film)[0];
+            assert_eq!((pixel.0, pixel.1.len()), (Aov::Normal, 3));
+            assert_eq!(pixel.1[1], aovs.means(Aov::Normal, &film).expect("it is summed")[1][17]);
+            let once = statistics.clone();
+            statistics.merge(&once);
+            assert_eq!(
+                (statistics.camera.rays, statistics.slice_seconds.len()),
+                (2 * camera, 2 * once.slice_seconds.len())
+            );
+        }
+        assert!(bits(&mut tracer) == reference, "counted: {is_counted}");
     }
     gpu::assert_no_validation_messages();
 }

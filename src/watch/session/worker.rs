@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::{CompiledKernel, Event, KERNEL, Options, Prints, Session};
 use crate::watch::hub::{ToPage, packed};
-use crate::watch::messages::{Frame, FromWorker, Ready, Stage, ToWorker};
+use crate::watch::messages::{Frame, FromWorker, Ready, Stage, ToWorker, View};
 use crate::watch::report::Report;
 use crate::watch::supervisor::{Heard, Helper};
 use crate::{Error, Result};
@@ -34,8 +34,11 @@ impl Session {
                 self.building = Some((edit, Instant::now()));
                 self.show_status();
             }
-            FromWorker::Built { edit, seconds } => {
+            FromWorker::Built { edit, seconds, kernel } => {
                 self.building = None;
+                if let Some(ready) = &mut self.ready {
+                    ready.kernel = kernel;
+                }
                 if let Some(report) = self.report(edit) {
                     report.build_ms = Some(1e3 * seconds);
                 }
@@ -55,9 +58,9 @@ impl Session {
                     self.show_status();
                 }
             }
-            FromWorker::Pixel { client, x, y, radiance, samples, variance, seen } => {
+            FromWorker::Pixel { client, x, y, radiance, samples, variance, seen, aovs } => {
                 let pixel = json!({"type": "pixel", "x": x, "y": y, "radiance": radiance, "samples": samples,
-                    "variance": variance, "seen": seen});
+                    "variance": variance, "seen": seen, "aovs": aovs});
                 self.hub.reply(client, ToPage::Text(Arc::new(pixel.to_string())));
             }
             FromWorker::Prints { edit, pixel, values } => self.printed(edit, pixel, values),
@@ -101,8 +104,9 @@ impl Session {
         let Some(index) = self.reports.iter().rposition(|report| report.edit == frame.edit) else { return };
         let before = self.reports[..index].iter().rev().find(|report| report.is_measured).cloned();
         let shows_value = self.view.debug && self.current.as_ref().is_some_and(|kernel| kernel.calls.has_pixel);
-        let (camera, pose, estimator) = (self.view.camera, self.view.pose, &self.view.estimator);
-        let view = format!("{camera} {pose:?} {estimator:?} {shows_value}");
+        let View { camera, pose, estimator, shown, statistics, .. } = &self.view;
+        // What is counted costs time: whatever adds to the kernel makes other figures.
+        let view = format!("{camera} {pose:?} {estimator:?} {shows_value} {} {statistics}", shown.is_empty());
         let is_first = self.reports[index].first_image_ms.is_none();
         if self.reports[index].observe(frame, &view, before.as_ref()) {
             let line = self.reports[index].to_string();

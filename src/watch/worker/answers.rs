@@ -1,7 +1,7 @@
 //! What the worker says of its picture and its scene.
 
 use super::loaded::camera_of;
-use super::{Worker, pick, say};
+use super::{Worker, aovs_of, pick, say};
 use crate::Result;
 use crate::watch::messages::{FromWorker, Ready};
 
@@ -17,6 +17,8 @@ impl Worker {
                 cameras: self.front.loaded.cameras(),
                 warnings: scene.warnings.iter().chain(&scene.notes).cloned().collect(),
                 resolution: [self.settings.width, self.settings.height],
+                aovs: aovs_of(key.trace).iter().map(ToString::to_string).collect(),
+                kernel: key.to_string(),
             }),
             &[],
         )
@@ -24,6 +26,7 @@ impl Worker {
 
     pub(super) fn send_frame(&mut self) -> Result<()> {
         let done = self.is_done();
+        self.shown.feed(self.tev.as_ref().filter(|tev| !self.view.moving && (done || tev.is_due())));
         match self.shown.frame(self.edit, self.start, &self.view, done)? {
             Some((frame, png)) => say(&FromWorker::Frame(frame), &png),
             None => Ok(()),
@@ -57,6 +60,7 @@ impl Worker {
                 samples: pixel.count,
                 variance: pixel.variance_of_mean().filter(|v| v.is_finite()),
                 seen: pick::seen_at(scene, &camera, [film.width(), film.height()], (x, y)),
+                aovs: self.shown.aovs_at((y * film.width() + x) as usize),
             },
             &[],
         )

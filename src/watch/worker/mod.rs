@@ -17,6 +17,9 @@ use self::loaded::camera_of;
 use self::shown::Shown;
 use super::messages::{Estimator, FromWorker, Stage, ToWorker, View};
 use super::wire::{read_message, write_message};
+use crate::film::aov::Aov;
+use crate::film::tev_feed::{TevFeed, TevNews};
+use crate::gpu::TraceBackend;
 use crate::render::{Baked, KernelKey, Settings, open_device};
 use crate::{Error, Result};
 
@@ -35,11 +38,11 @@ enum Incoming {
     Closed,
 }
 
-/// Renders until standard input ends.
+/// Renders until standard input ends, and shows the image in the viewer tev at an address, whenever one is there.
 ///
 /// # Errors
 /// No device, a scene that is bad at the start, a lost device.
-pub fn run(settings: Settings, load: LoadScene) -> Result<()> {
+pub fn run(settings: Settings, load: LoadScene, tev: Option<&str>) -> Result<()> {
     let (send, inbox) = channel();
     let done = send.clone();
     std::thread::spawn(move || listen(&send));
@@ -48,10 +51,13 @@ pub fn run(settings: Settings, load: LoadScene) -> Result<()> {
     let view = View { estimator: Estimator::of(&settings), ..View::default() };
     let wanted = Wanted { edit: 0, settings, view: view.clone(), prints: false, reload: false };
     let (builder, front) = Builder::start(device, &wanted, load, done)?;
+    let tev = tev.map(|address| feed(address, &front.loaded.scene.name));
     let aim = KernelKey { baked: Baked::default(), ..*front.tracer.key() };
     let mut worker = Worker {
         camera: view.camera,
+        kept: wanted.settings.aovs.clone(),
         settings: wanted.settings,
+        tev,
         prints: false,
         view,
         builder,
@@ -85,9 +91,27 @@ fn say(message: &FromWorker, bytes: &[u8]) -> Result<()> {
     write_message(&mut out, message, bytes).and_then(|()| out.flush()).map_err(|_| Error::Interrupted)
 }
 
+/// A viewer that is slow or away costs nothing but its pictures.
+fn feed(address: &str, name: &str) -> TevFeed {
+    let at = address.to_owned();
+    TevFeed::keep(address, name, move |news| match news {
+        TevNews::Connected => eprintln!("tev at {at} shows the image"),
+        TevNews::Missing(error) => eprintln!("tev at {at}: {error}; it gets the image as soon as it is there"),
+        TevNews::Lost(error) => eprintln!("tev at {at} is gone: {error}"),
+    })
+}
+
+/// The AOVs that a back end can give: nobody can tell what ray queries visit.
+fn aovs_of(trace: TraceBackend) -> Vec<Aov> {
+    Aov::ALL.iter().copied().filter(|&aov| aov != Aov::Cost || trace == TraceBackend::Bvh).collect()
+}
+
 struct Worker {
     /// What is asked for; what is in front may still have others.
     settings: Settings,
+    /// AOVs that are summed whatever is shown.
+    kept: Vec<Aov>,
+    tev: Option<TevFeed>,
     prints: bool,
     view: View,
     builder: Builder,
@@ -165,15 +189,22 @@ impl Worker {
     fn change_view(&mut self, view: View) -> Result<()> {
         let old = std::mem::replace(&mut self.view, view);
         self.view.estimator.apply(&mut self.settings);
+        self.settings.statistics = self.view.statistics;
+        // All at once: then going from one to another builds no kernel.
+        self.settings.aovs = match self.view.shown.parse::<Aov>() {
+            Ok(_) => aovs_of(self.front.tracer.key().trace),
+            Err(_) => self.kept.clone(),
+        };
         if old.estimator != self.view.estimator || self.key_of_view()? != self.aim {
             // What is in front goes on, with its own camera and estimator, until the other kernel is there.
-            self.order(self.edit, false)?;
+            self.order(self.edit, old.estimator.prepares_otherwise(&self.view.estimator))?;
         }
         let camera = self.fitting_camera()?.unwrap_or(self.camera);
         if self.camera != camera || (old.pose, old.moving) != (self.view.pose, self.view.moving) {
             self.camera = camera;
             self.restart();
-        } else if (old.exposure, &old.tonemap) != (self.view.exposure, &self.view.tonemap) {
+        } else if (old.exposure, &old.tonemap, &old.shown) != (self.view.exposure, &self.view.tonemap, &self.view.shown)
+        {
             return self.send_frame();
         } else if old.pixel != self.view.pixel && self.shown.spp > 0 {
             return self.print();
@@ -226,7 +257,8 @@ impl Worker {
                 self.edit = edit;
                 self.camera = self.fitting_camera()?.unwrap_or(view.camera);
                 self.restart();
-                say(&FromWorker::Built { edit, seconds: self.front.tracer.compile_seconds }, &[])?;
+                let (seconds, kernel) = (self.front.tracer.compile_seconds, self.front.tracer.key().to_string());
+                say(&FromWorker::Built { edit, seconds, kernel }, &[])?;
                 self.building()?;
                 if reload {
                     self.aim = self.key_in_front();

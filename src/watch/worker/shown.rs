@@ -3,11 +3,14 @@
 use std::time::{Duration, Instant};
 
 use crate::film::Film;
+use crate::film::aov::{Aov, AovFilm};
+use crate::film::aov_picture::{AovPicture, aov_picture};
 use crate::film::exr::ExrImage;
 use crate::film::metadata::{Metadata, REC709_CHROMATICITIES, software};
 use crate::film::png::{encode_png, tone_map_srgb8};
+use crate::film::tev_feed::TevFeed;
 use crate::film::tonemap::ToneMap;
-use crate::render::{Run, Settings};
+use crate::render::{Run, Settings, Statistics};
 use crate::watch::messages::{Frame, View};
 use crate::{Error, Result};
 
@@ -20,6 +23,8 @@ const ROUND: Duration = Duration::from_millis(100);
 #[derive(Default)]
 pub(super) struct Shown {
     pub(super) film: Option<Film>,
+    aovs: Option<AovFilm>,
+    statistics: Option<Statistics>,
     pub(super) spp: u32,
     seconds: f64,
     rays: u64,
@@ -37,6 +42,14 @@ impl Shown {
         match &mut self.film {
             Some(film) => film.merge(&run.film),
             None => self.film = Some(run.film),
+        }
+        match (&mut self.aovs, run.aovs) {
+            (Some(mine), Some(theirs)) => mine.merge(&theirs),
+            (_, aovs) => self.aovs = aovs,
+        }
+        match (&mut self.statistics, run.statistics) {
+            (Some(mine), Some(theirs)) => mine.merge(&theirs),
+            (_, statistics) => self.statistics = statistics,
         }
     }
 
@@ -59,7 +72,12 @@ impl Shown {
     /// The image as a PNG with its figures; `None` if there is none yet.
     pub(super) fn frame(&mut self, edit: u32, start: u32, view: &View, done: bool) -> Result<Option<(Frame, Vec<u8>)>> {
         let Some(film) = &self.film else { return Ok(None) };
-        let png = png_of(film, view).map_err(Error::Usage)?;
+        let drawn = self.drawn(view);
+        let png = match &drawn {
+            Some((_, picture)) => encode_png(film.width(), film.height(), &picture.pixels),
+            None => png_of(film, view),
+        };
+        let png = png.map_err(Error::Usage)?;
         self.sent = Some(Instant::now());
         let frame = Frame {
             edit,
@@ -73,8 +91,30 @@ impl Shown {
             non_finite: self.non_finite,
             done,
             moving: view.moving,
+            shown: drawn.as_ref().map(|(aov, _)| aov.to_string()),
+            scale: drawn.and_then(|(_, picture)| picture.scale),
+            statistics: self.statistics.as_ref().and_then(|counted| serde_json::to_value(counted.report()).ok()),
         };
         Ok(Some((frame, png)))
+    }
+
+    /// The AOV that the view shows, if it is summed.
+    fn drawn(&self, view: &View) -> Option<(Aov, AovPicture)> {
+        let aov = view.shown.parse().ok()?;
+        Some((aov, aov_picture(self.aovs.as_ref()?, self.film.as_ref()?, aov)?))
+    }
+
+    /// Hands the image and its AOVs to a viewer.
+    pub(super) fn feed(&self, viewer: Option<&TevFeed>) {
+        if let (Some(viewer), Some(film)) = (viewer, &self.film) {
+            viewer.show(film, self.aovs.as_ref());
+        }
+    }
+
+    /// Names and means of the AOVs of a pixel.
+    pub(super) fn aovs_at(&self, pixel: usize) -> Vec<(String, Vec<f64>)> {
+        let (Some(film), Some(aovs)) = (&self.film, &self.aovs) else { return Vec::new() };
+        aovs.pixel_means(pixel, film).into_iter().map(|(aov, means)| (aov.to_string(), means)).collect()
     }
 
     /// The image as a file, `png` or `exr`; `None` if there is none yet.
@@ -85,7 +125,11 @@ impl Shown {
         metadata: Metadata,
     ) -> Option<std::result::Result<Vec<u8>, String>> {
         let film = self.film.as_ref()?;
-        Some(if format == "exr" { exr_bytes(film, metadata).map_err(|e| e.to_string()) } else { png_of(film, view) })
+        Some(match (format, self.drawn(view)) {
+            ("exr", _) => exr_bytes(film, self.aovs.as_ref(), metadata).map_err(|e| e.to_string()),
+            (_, Some((_, picture))) => encode_png(film.width(), film.height(), &picture.pixels),
+            (_, None) => png_of(film, view),
+        })
     }
 
     /// What an EXR says of itself.
@@ -112,9 +156,13 @@ fn png_of(film: &Film, view: &View) -> std::result::Result<Vec<u8>, String> {
 }
 
 /// An EXR file's bytes: its library writes to a file.
-fn exr_bytes(film: &Film, metadata: Metadata) -> Result<Vec<u8>> {
+fn exr_bytes(film: &Film, aovs: Option<&AovFilm>, metadata: Metadata) -> Result<Vec<u8>> {
     let folder = tempfile::tempdir().map_err(|e| Error::io(&std::env::temp_dir(), "make a folder in it", e))?;
     let path = folder.path().join("image.exr");
-    ExrImage::from_film(film, metadata).write(&path)?;
+    let mut image = ExrImage::from_film(film, metadata);
+    if let Some(aovs) = aovs {
+        aovs.push_layers(film, &mut image);
+    }
+    image.write(&path)?;
     std::fs::read(&path).map_err(|e| Error::io(&path, "read", e))
 }

@@ -1,0 +1,99 @@
+//! `watch --tev` as the files of a scene are saved: a listener that takes the pictures as tev does sees each change.
+
+use std::io::Read;
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::watch::Watch;
+
+/// Mean of the channels R, G and B of each picture that a viewer is sent.
+fn pictures(listener: TcpListener) -> Receiver<[f32; 3]> {
+    let (send, means) = channel();
+    std::thread::spawn(move || {
+        while let Ok((mut stream, _)) = listener.accept() {
+            while let Some(packet) = packet(&mut stream) {
+                const UPDATE: u8 = 6;
+                // R, G, B and variance, one after the other at the packet's end.
+                let floats: Vec<f32> = packet[packet.len().saturating_sub(4 * 4 * 32 * 32)..]
+                    .chunks_exact(4)
+                    .map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap()))
+                    .collect();
+                let mean = |channel: usize| floats[channel * 1024..][..1024].iter().sum::<f32>() / 1024.0;
+                if packet[0] == UPDATE && send.send([0, 1, 2].map(mean)).is_err() {
+                    return;
+                }
+            }
+        }
+    });
+    means
+}
+
+/// The length, which counts itself, and the rest.
+fn packet(stream: &mut TcpStream) -> Option<Vec<u8>> {
+    let mut length = [0; 4];
+    stream.read_exact(&mut length).ok()?;
+    let mut rest = vec![0; u32::from_le_bytes(length) as usize - 4];
+    stream.read_exact(&mut rest).ok()?;
+    Some(rest)
+}
+
+/// The next picture that is as it should be, within two minutes: drivers compile slowly, machines are loaded.
+fn expect(pictures: &Receiver<[f32; 3]>, what: &str, is_wanted: impl Fn([f32; 3]) -> bool) -> [f32; 3] {
+    let (start, mut seen) = (Instant::now(), Vec::new());
+    while let Some(left) = Duration::from_secs(120).checked_sub(start.elapsed()) {
+        let Ok(mean) = pictures.recv_timeout(left) else { break };
+        if is_wanted(mean) {
+            return mean;
+        }
+        seen.push(mean);
+    }
+    panic!("{what}: among {seen:?}");
+}
+
+fn paint(path: &Path, color: [u8; 3]) {
+    image::RgbImage::from_pixel(8, 4, image::Rgb(color)).save(path).unwrap();
+}
+
+/// The textured scene with its first image in a file.
+fn scene_of_files(folder: &Path) -> (std::path::PathBuf, Value) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/textured.gltf");
+    let mut json: Value = serde_json::from_slice(&std::fs::read(source).unwrap()).unwrap();
+    json["images"][0]["uri"] = "floor.png".into();
+    let scene = folder.join("scene.gltf");
+    std::fs::write(&scene, json.to_string()).unwrap();
+    (scene, json)
+}
+
+#[test]
+fn a_saved_texture_environment_or_scene_is_the_new_picture_in_the_viewer() {
+    let folder = tempfile::tempdir().unwrap();
+    let (texture, sky) = (folder.path().join("floor.png"), folder.path().join("sky.png"));
+    let (scene, mut json) = scene_of_files(folder.path());
+    paint(&texture, [255; 3]);
+    paint(&sky, [128; 3]);
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let seen = pictures(listener);
+    let watch = Watch::of(&scene, &["--spp", "16", "--env", sky.to_str().unwrap(), "--tev", &address]);
+    let [red, _, blue] = expect(&seen, "a picture", |mean| mean[0] > 0.0);
+
+    paint(&texture, [255, 0, 0]);
+    watch.expect(&["floor.png:", "first image"]);
+    let [floor_red, _, floor_blue] = expect(&seen, "a red floor", |mean| mean[0] / mean[2] > 1.2 * red / blue);
+
+    paint(&sky, [0, 0, 255]);
+    watch.expect(&["sky.png:", "first image"]);
+    expect(&seen, "a blue sky", |mean| mean[2] / mean[0] > 1.2 * floor_blue / floor_red);
+
+    std::fs::write(&scene, "{").unwrap();
+    watch.expect(&["cannot be shown", "scene.gltf"]);
+    json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = serde_json::json!([0, 0, 0, 1]);
+    paint(&sky, [128; 3]);
+    std::fs::write(&scene, json.to_string()).unwrap();
+    watch.expect(&["first image"]);
+    expect(&seen, "a black floor", |mean| mean[0] < 0.9 * floor_red);
+}
