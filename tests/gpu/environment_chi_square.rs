@@ -58,7 +58,7 @@ impl Image {
     }
 
     fn prepared(&self) -> PreparedEnvironment {
-        prepare(&self.environment(), EnvironmentSampling::Importance).expect("it fits")
+        prepare(&self.environment(), EnvironmentSampling::default()).expect("it fits")
     }
 
     fn texel(&self, x: i64, y: i64) -> DVec3 {
