@@ -59,7 +59,8 @@ pub(crate) struct EstimatorArgs {
     /// Rotation of the environment about +Y in degrees, counter-clockwise seen from above.
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true, value_parser = parse::finite, help_heading = "Environment")]
     env_rotation: f64,
-    /// How directions to the environment are chosen.
+    /// How directions to the environment are chosen: by what is brighter than its mean, the rest being left to BSDF samples; by
+    /// brightness; or evenly.
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<EnvironmentSampling>(EnvironmentSampling::NAMES), help_heading = "Environment")]
     env_sampling: EnvironmentSampling,
 

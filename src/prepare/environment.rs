@@ -51,7 +51,7 @@ pub enum EnvironmentKind {
     Image,
 }
 
-/// Prepares the environment; CDFs are made for [`EnvironmentSampling::Importance`] of images only.
+/// Prepares the environment; CDFs are made of images only, and not for [`EnvironmentSampling::Uniform`].
 ///
 /// # Errors
 /// If the image has more words than 32 bits can address.
@@ -95,7 +95,7 @@ fn image(
     if texel_words + cdf_words + 3 > u64::from(u32::MAX) {
         return Err(PrepareError::EnvironmentTooLarge { width, height });
     }
-    let tents = Tents::new(width, height, texels);
+    let tents = Tents::new(width, height, texels, sampling);
     let mut prepared = PreparedEnvironment {
         kind: EnvironmentKind::Image,
         array: texels.iter().map(|&[r, g, b]| [r.to_bits(), g.to_bits(), b.to_bits(), 0]).collect(),
@@ -103,10 +103,10 @@ fn image(
         height,
         radiance: [strength; 3],
         rotation_radians,
-        mean_luminance: tents.mean() * f64::from(strength),
+        mean_luminance: tents.mean * f64::from(strength),
         ..PreparedEnvironment::default()
     };
-    if sampling == EnvironmentSampling::Importance {
+    if sampling != EnvironmentSampling::Uniform {
         prepared.marginal_word = texel_words as u32;
         prepared.conditional_word = prepared.marginal_word + guided_words(height) as u32;
         prepared.array.extend(super::pack_words(&tents.cdf_words()));
@@ -120,27 +120,46 @@ fn guided_words(bins: u32) -> u64 {
     u64::from(bins) + 1 + cdf::guide_words(bins as usize) as u64
 }
 
-/// What the texels' tents hold: luminance times the integral of the tent and sin θ.
+/// The share of its luminance that a texel below the mean keeps under [`EnvironmentSampling::Compensated`]. Without it
+/// (Karlík et al. 2019) a direction that no BSDF sample takes would be lost: to `--light-sampling nee`, and to lobes whose
+/// light is all in a place where their own density is next to nothing.
+const KEPT_BELOW_THE_MEAN: f64 = 1.0 / 16.0;
+
+/// What the texels' tents hold: weight times the integral of the tent and sin θ.
 struct Tents<'a> {
     width: usize,
-    height: usize,
     texels: &'a [[f32; 3]],
-    /// Luminance times [`tent_sine`], a row's sum.
+    /// Mean over the sphere of the interpolated luminance.
+    mean: f64,
+    sampling: EnvironmentSampling,
+    /// Weight times [`tent_sine`], a row's sum.
     rows: Vec<f64>,
 }
 
 impl<'a> Tents<'a> {
-    fn new(width: u32, height: u32, texels: &'a [[f32; 3]]) -> Self {
+    fn new(width: u32, height: u32, texels: &'a [[f32; 3]], sampling: EnvironmentSampling) -> Self {
         let (width, height) = (width as usize, height as usize);
-        let row =
-            |(y, row): (usize, &[[f32; 3]])| row.iter().map(|t| luminance(*t)).sum::<f64>() * tent_sine(y, height);
-        let rows = texels.chunks_exact(width).enumerate().map(row).collect();
-        Self { width, height, texels, rows }
+        let mut tents = Self { width, texels, mean: 0.0, sampling, rows: Vec::new() };
+        // dω = 2π² sin θ du dv.
+        let sum: f64 = tents.row_sums(luminance).iter().sum();
+        tents.mean = sum * PI / (2.0 * (width * height) as f64);
+        tents.rows = tents.row_sums(|texel| tents.weight(texel));
+        tents
     }
 
-    /// Mean over the sphere of the interpolated luminance: dω = 2π² sin θ du dv.
-    fn mean(&self) -> f64 {
-        self.rows.iter().sum::<f64>() * PI / (2.0 * (self.width * self.height) as f64)
+    fn row_sums(&self, of: impl Fn([f32; 3]) -> f64) -> Vec<f64> {
+        let height = self.texels.len() / self.width;
+        let row = |(y, row): (usize, &[[f32; 3]])| row.iter().map(|t| of(*t)).sum::<f64>() * tent_sine(y, height);
+        self.texels.chunks_exact(self.width).enumerate().map(row).collect()
+    }
+
+    /// By what a texel is picked.
+    fn weight(&self, texel: [f32; 3]) -> f64 {
+        let light = luminance(texel);
+        match self.sampling {
+            EnvironmentSampling::Compensated => (light - self.mean).max(KEPT_BELOW_THE_MEAN * light),
+            _ => light,
+        }
     }
 
     /// The marginal CDF, then the conditional ones, each with its guide.
@@ -155,7 +174,7 @@ impl<'a> Tents<'a> {
         let mut weights = Vec::with_capacity(self.width);
         for row in self.texels.chunks_exact(self.width) {
             weights.clear();
-            weights.extend(row.iter().map(|t| luminance(*t)));
+            weights.extend(row.iter().map(|t| self.weight(*t)));
             add(&weights);
         }
         words

@@ -75,7 +75,7 @@ impl Default for PrepareOptions {
     fn default() -> Self {
         Self {
             camera: DVec3::ZERO,
-            environment_sampling: EnvironmentSampling::Importance,
+            environment_sampling: EnvironmentSampling::default(),
             sample_environment: true,
             mip: true,
             light_choice: LightChoice::default(),
@@ -88,8 +88,12 @@ impl Default for PrepareOptions {
 named_enum! {
     /// How directions to an image environment are chosen.
     EnvironmentSampling, "environment sampling" {
-        /// In proportion to its luminance.
+        /// In proportion to what is above its mean luminance, and to a sixteenth of the rest, which BSDF samples find: MIS
+        /// compensation (Karlík et al. 2019, "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance
+        /// Sampling").
         #[default]
+        Compensated = "compensated",
+        /// In proportion to its luminance.
         Importance = "importance",
         /// Evenly over the sphere.
         Uniform = "uniform",

@@ -145,7 +145,7 @@ impl KernelKey {
             (5, integrator),
             (6, self.light_sampling as u32),
             (7, self.mis_heuristic as u32),
-            (8, self.env_sampling as u32),
+            (8, u32::from(self.env_sampling == EnvironmentSampling::Uniform)),
             (9, self.stack_size),
             (10, self.sampler as u32 + u32::from(self.replicates)),
             (11, u32::from(f.light_choice == LightChoice::Bvh)),

@@ -47,7 +47,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--sampler", "halton", "sobol, independent"),
         ("--light-sampling", "all", "mis, mixture, nee, bsdf"),
         ("--mis", "max", "balance, power"),
-        ("--env-sampling", "all", "importance, uniform"),
+        ("--env-sampling", "all", "compensated, importance, uniform"),
         ("--env-strength", "-1", "not negative"),
         ("--env-rotation", "inf", "finite"),
         ("--exposure", "nan", "finite"),

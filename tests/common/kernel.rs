@@ -38,7 +38,12 @@ impl TestKernel {
 
     /// The same, lights being picked as is said.
     pub fn with_choice(file: &str, scene: &Scene, light_choice: LightChoice) -> Self {
-        let (prepared, constants) = gpu::prepared(scene, &Settings { light_choice, ..gpu::settings(64, 64) });
+        Self::with_settings(file, scene, &Settings { light_choice, ..gpu::settings(64, 64) })
+    }
+
+    /// The same, the scene being prepared for other settings.
+    pub fn with_settings(file: &str, scene: &Scene, settings: &Settings) -> Self {
+        let (prepared, constants) = gpu::prepared(scene, settings);
         let by_bvh = prepared.features.light_choice == LightChoice::Bvh;
         Self {
             file: format!("test/{file}"),

@@ -95,12 +95,14 @@ fn environment_samplings_agree() {
     let reference = mean(&scene, &settings);
     for (env_sampling, light_sampling) in [
         (EnvironmentSampling::Uniform, LightSampling::Mis),
-        (EnvironmentSampling::Importance, LightSampling::Mixture),
+        (EnvironmentSampling::Importance, LightSampling::Mis),
+        (EnvironmentSampling::Compensated, LightSampling::Mixture),
+        (EnvironmentSampling::Compensated, LightSampling::Nee),
         (EnvironmentSampling::Importance, LightSampling::Nee),
         (EnvironmentSampling::Uniform, LightSampling::Nee),
         (EnvironmentSampling::Importance, LightSampling::Bsdf),
     ] {
         let other = Settings { env_sampling, light_sampling, ..settings.clone() };
-        assert_agree(&format!("importance mis and {env_sampling} {light_sampling}"), reference, mean(&scene, &other));
+        assert_agree(&format!("compensated mis and {env_sampling} {light_sampling}"), reference, mean(&scene, &other));
     }
 }

@@ -4,11 +4,13 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+use crate::common::gpu::settings;
 use crate::common::kernel::{Random, TestKernel, empty_scene, floats, vector, vector_texel};
 use crate::common::statistics::{ChiSquare, chi_square_test, sidak};
 use glam::DVec3;
 use sunfleck::prepare::EnvironmentSampling;
 use sunfleck::prepare::environment::{PreparedEnvironment, prepare, tent_sine};
+use sunfleck::render::Settings;
 use sunfleck::scene::{Environment, Scene};
 
 /// Level of each test here, all of its images together.
@@ -58,7 +60,7 @@ impl Image {
     }
 
     fn prepared(&self) -> PreparedEnvironment {
-        prepare(&self.environment(), EnvironmentSampling::Importance).expect("it fits")
+        prepare(&self.environment(), EnvironmentSampling::default()).expect("it fits")
     }
 
     fn texel(&self, x: i64, y: i64) -> DVec3 {
@@ -106,9 +108,13 @@ fn images() -> Vec<Image> {
     ]
 }
 
-fn kernel(image: &Image) -> TestKernel {
+fn kernel_for(image: &Image, env_sampling: EnvironmentSampling) -> TestKernel {
     let scene = Scene { environment: image.environment(), ..empty_scene() };
-    TestKernel::with_scene("environment.comp", &scene)
+    TestKernel::with_settings("environment.comp", &scene, &Settings { env_sampling, ..settings(64, 64) })
+}
+
+fn kernel(image: &Image) -> TestKernel {
+    kernel_for(image, EnvironmentSampling::default())
 }
 
 /// Radiance and density of directions, as the shader has them.
@@ -184,12 +190,14 @@ fn chi_square(image: &Image, samples: &[Sample], expected: &[f64]) -> ChiSquare 
 #[test]
 fn importance_sampling_follows_the_pdf() {
     let images = images();
-    for image in &images {
-        let expected = expected(kernel(image), image);
+    let samplings = [EnvironmentSampling::Compensated, EnvironmentSampling::Importance];
+    for (image, sampling) in images.iter().flat_map(|image| samplings.map(|sampling| (image, sampling))) {
+        let name = format!("{}×{}, {sampling}", image.width, image.height);
+        let expected = expected(kernel_for(image, sampling), image);
         let total: f64 = expected.iter().sum();
-        assert!((total - 1.0).abs() < 1e-5, "the density of {}×{} sums up to {total}", image.width, image.height);
-        let result = chi_square(image, &sample(&kernel(image)), &expected);
-        assert!(result.p_value > sidak(ALPHA, images.len()), "{}×{}: {result:?}", image.width, image.height);
+        assert!((total - 1.0).abs() < 1e-5, "{name}: the density sums up to {total}");
+        let result = chi_square(image, &sample(&kernel_for(image, sampling)), &expected);
+        assert!(result.p_value > sidak(ALPHA, 2 * images.len()), "{name}: {result:?}");
     }
 }
 
@@ -261,7 +269,7 @@ fn nothing_of_the_image_is_left_in_the_weight() {
         let sine = |row: i64| tent_sine(row.clamp(0, height as i64 - 1) as usize, height);
         let total: f64 = (0..height).map(|y| sine(y as i64) * row_sum(&image, y)).sum();
         let mean = total * f64::from(STRENGTH) * 2.0 * PI * PI / (image.width * height) as f64;
-        for s in sample(&kernel(&image)) {
+        for s in sample(&kernel_for(&image, EnvironmentSampling::Importance)) {
             let (_, v) = image.uv(s.direction);
             let row = (v * height as f64 - 0.5).floor() as i64;
             let ratios = [row - 1, row, row + 1, row + 2].map(|row| (v * PI).sin() / sine(row));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::common::random::Random;
 use glam::DVec3;
 use sunfleck::layout::CDF_TOTAL;
-use sunfleck::prepare::EnvironmentSampling::{Importance, Uniform};
+use sunfleck::prepare::EnvironmentSampling::{self, Compensated, Importance, Uniform};
 use sunfleck::prepare::environment::{EnvironmentKind, PreparedEnvironment, direction_to_uv, prepare, tent_sine};
 use sunfleck::scene::Environment;
 
@@ -55,7 +55,12 @@ fn integrate(environment: &PreparedEnvironment, per_texel: u32, f: impl Fn(DVec3
 }
 
 fn check(environment: &Environment) -> PreparedEnvironment {
-    let prepared = prepare(environment, Importance).unwrap();
+    check_sampling(environment, Compensated);
+    check_sampling(environment, Importance)
+}
+
+fn check_sampling(environment: &Environment, sampling: EnvironmentSampling) -> PreparedEnvironment {
+    let prepared = prepare(environment, sampling).unwrap();
     assert_eq!(prepared.kind, EnvironmentKind::Image);
     let (width, height) = (prepared.width as usize, prepared.height as usize);
     let marginal = prepared.marginal();
@@ -125,6 +130,27 @@ fn density_follows_brightness() {
     let prepared = check(&image(64, 32, 0.0, |x, _| if x < 32 { [3.0; 3] } else { [1.0; 3] }));
     let [bright, dim] = [0.25, 0.75].map(|u| prepared.pdf_solid_angle(direction(u, 0.4)));
     assert!((bright / dim - 3.0).abs() < 1e-6);
+}
+
+/// max(Y − mean, Y/16), whatever the strength; and a white image is sampled like any other.
+#[test]
+fn compensation_takes_the_mean_away() {
+    let sky = image(64, 32, 0.0, |x, y| match (x, y) {
+        (7, 9) => [3000.0; 3],
+        _ if y < 16 => [2.0; 3],
+        _ => [0.5; 3],
+    });
+    let prepared = check_sampling(&sky, Compensated);
+    let mean = prepared.mean_luminance / 2.0;
+    assert!(mean > 2.0, "{mean}");
+    let per_light = |x: usize, y: usize, weight: f64| prepared.texel_probability(x, y) / (weight * tent_sine(y, 32));
+    let sun = per_light(7, 9, 3000.0 - mean);
+    for (x, y, light) in [(7, 8, 2.0), (40, 3, 2.0), (30, 20, 0.5)] {
+        assert!((per_light(x, y, light / 16.0) / sun - 1.0).abs() < 1e-4, "({x}, {y})");
+    }
+    assert!(prepared.texel_probability(7, 9) > 0.9 && check_sampling(&sky, Importance).texel_probability(7, 9) < 0.7);
+    let white = |sampling| check_sampling(&image(8, 4, 0.0, |_, _| [1.0; 3]), sampling).texel_probability(3, 1);
+    assert!((white(Compensated) / white(Importance) - 1.0).abs() < 1e-6);
 }
 
 #[test]
