@@ -38,7 +38,7 @@ arguments_of() {
     elif [ "$1" = mesa-25-ray-query ]; then
         printf '%s\n' --test gpu --
         [ "$form" != short ] || printf -- '--skip\n%s\n' error_estimate mutations agreement mitsuba_images bitterli
-        printf -- '--skip\n%s\n' bsdf_ mitsuba_bsdfs environment_chi_square layout light_sampling sampler shader_math shaders_valid texture::
+        printf -- '--skip\n%s\n' bsdf_ mitsuba_bsdfs environment_chi_square layout light_sampling sampler shader_math shader_test shaders_valid sobol:: texture::
     else
         printf '%s\n' "${default[@]}"
     fi
