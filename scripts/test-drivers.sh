@@ -14,11 +14,11 @@ scripts/drivers.sh
 
 # These test binaries touch a device; the others need no repetition, nor does the arithmetic of `bench`. The stress suite takes
 # a run of its own: scripts/test-drivers.sh --test stress. The short form leaves out what is no driver's doing: the arithmetic
-# of the error estimate, which the host does, the agreement of estimators and with other renderers, and the deliberate bugs: that a test notices one is
+# of the error estimate, which the host does, the reading of saved files, the agreement of estimators and with other renderers, and the deliberate bugs: that a test notices one is
 # shown on one driver.
 default=(--test gpu --test cli -- --skip bench::)
 form=${SUNFLECK_DRIVERS_FORM:-full}
-[ "$form" != short ] || default+=(--skip error_estimate --skip mutations --skip agreement --skip mitsuba_images --skip bitterli)
+[ "$form" != short ] || default+=(--skip error_estimate --skip mutations --skip agreement --skip mitsuba_images --skip bitterli --skip watch_files::)
 cargo test --quiet --no-run "${@:-${default[@]}}"
 
 # Whether the device that is taken by default is lavapipe, and its library the one that drivers.sh fetched as mesa-22.
