@@ -14,11 +14,14 @@ scripts/drivers.sh
 
 # These test binaries touch a device; the others need no repetition, nor does the arithmetic of `bench`. The stress suite takes
 # a run of its own: scripts/test-drivers.sh --test stress. The short form leaves out what is no driver's doing: the arithmetic
-# of the error estimate, which the host does, the reading of saved files, the agreement of estimators and with other renderers, and the deliberate bugs: that a test notices one is
-# shown on one driver.
-default=(--test gpu --test cli -- --skip bench::)
+# of the error estimate, which the host does, the agreement of estimators and with other
+# renderers, and the deliberate bugs: that a test notices one is shown on one driver.
 form=${SUNFLECK_DRIVERS_FORM:-full}
-[ "$form" != short ] || default+=(--skip error_estimate --skip mutations --skip agreement --skip mitsuba_images --skip bitterli --skip watch_files::)
+left_out=()
+if [ "$form" = short ]; then
+    for name in error_estimate mutations agreement mitsuba_images bitterli; do left_out+=(--skip "$name"); done
+fi
+default=(--test gpu --test cli -- --skip bench:: "${left_out[@]}")
 cargo test --quiet --no-run "${@:-${default[@]}}"
 
 # Whether the device that is taken by default is lavapipe, and its library the one that drivers.sh fetched as mesa-22.
@@ -36,8 +39,7 @@ arguments_of() {
     if [ $# -gt 1 ]; then
         printf '%s\n' "${@:2}"
     elif [ "$1" = mesa-25-ray-query ]; then
-        printf '%s\n' --test gpu --
-        [ "$form" != short ] || printf -- '--skip\n%s\n' error_estimate mutations agreement mitsuba_images bitterli
+        printf '%s\n' --test gpu -- "${left_out[@]}"
         printf -- '--skip\n%s\n' bsdf_ mitsuba_bsdfs environment_chi_square layout light_sampling sampler shader_math shader_test shaders_valid sobol:: texture::
     else
         printf '%s\n' "${default[@]}"

@@ -10,6 +10,9 @@
 
 layout(constant_id = 1) const uint CHUNK_SHIFT = 31u;
 
+// A word is picked from its element by an index. Selects, whose operands depend on words that were picked before, take
+// SwiftShader minutes and gigabytes to compile (docs/benchmarks).
+//
 // Chunk c of array a is element 4·a + c. All indices below are constants: dynamic indexing of descriptors is a feature
 // that not every device has.
 #if ARRAY_FORM == FORM_TEXEL_BUFFER
@@ -37,10 +40,7 @@ layout(set = 0, binding = 3, std140) uniform ArrayAddresses { uvec4 array_addres
         return FETCH(4 * number, index);                                       \
     }                                                                          \
     uint load1_##name(uint index) {                                            \
-        uvec4 texel = load4_##name(index >> 2u);                               \
-        uint low = (index & 1u) == 0u ? texel.x : texel.y;                     \
-        uint high = (index & 1u) == 0u ? texel.z : texel.w;                    \
-        return (index & 2u) == 0u ? low : high;                                \
+        return load4_##name(index >> 2u)[index & 3u];                          \
     }
 
 DEFINE_ARRAY(SLOTS, 0)

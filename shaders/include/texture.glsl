@@ -23,31 +23,17 @@ int wrap_texel(int i, int size, uint mode) {
 }
 
 // A texel as it is stored, from 0 to 1. What has 16 bits lies in two words of one element of the array, since images begin at
-// whole elements. Lookups of one slice are of both widths, so that a branch costs both sides on lavapipe, which has texel
-// buffers; without the branch SwiftShader, which has not, takes 2 to 5 times as long to compile (docs/benchmarks).
-#if ARRAY_FORM == FORM_TEXEL_BUFFER
+// whole elements. Lookups of one slice are of both widths, so that a branch would cost both sides on lavapipe.
 vec4 stored_texel(TextureHeader header, uint index) {
     bool wide = (header.sampling & TEXTURE_16_BIT) != 0u;
     uint word = header.first_word + (index << uint(wide));
     uvec4 four = LOAD4(TEXELS, word >> 2u);
-    uvec2 two = (word & 2u) == 0u ? four.xy : four.zw;
-    uint one = (word & 1u) == 0u ? two.x : two.y;
-    uvec4 bits = wide ? uvec4(two.x & 0xffffu, two.x >> 16u, two.y & 0xffffu, two.y >> 16u)
+    uint one = four[word & 3u];
+    uint next = four[(word & 3u) | 1u];
+    uvec4 bits = wide ? uvec4(one & 0xffffu, one >> 16u, next & 0xffffu, next >> 16u)
                       : uvec4(one & 255u, (one >> 8u) & 255u, (one >> 16u) & 255u, one >> 24u);
     return vec4(bits) * (wide ? 1.0 / 65535.0 : 1.0 / 255.0);
 }
-#else
-vec4 stored_texel(TextureHeader header, uint index) {
-    if ((header.sampling & TEXTURE_16_BIT) != 0u) {
-        uint word = header.first_word + 2u * index;
-        uvec4 four = LOAD4(TEXELS, word >> 2u);
-        uvec2 two = (word & 2u) == 0u ? four.xy : four.zw;
-        return vec4(two.x & 0xffffu, two.x >> 16u, two.y & 0xffffu, two.y >> 16u) * (1.0 / 65535.0);
-    }
-    uint one = LOAD1(TEXELS, header.first_word + index);
-    return vec4(one & 255u, (one >> 8u) & 255u, (one >> 16u) & 255u, one >> 24u) * (1.0 / 255.0);
-}
-#endif
 
 vec4 fetch_texel(TextureHeader header, ivec2 texel) {
     uint x = uint(wrap_texel(texel.x, int(header.width), (header.sampling >> TEXTURE_WRAP_U_SHIFT) & 3u));

@@ -96,7 +96,6 @@ fn a_saved_texture_or_scene_is_the_new_picture_in_the_viewer() {
     expect(&seen, "a black floor", |mean| mean[0] < 0.9 * floor_red);
 }
 
-/// SwiftShader compiles kernels with image environments for minutes.
 #[test]
 fn a_saved_environment_is_the_new_picture_in_the_viewer() {
     let folder = tempfile::tempdir().unwrap();
