@@ -58,6 +58,16 @@ uint shading_rounds() {
     return count;
 }
 
+// Times that a lane may search on, or end a shadow ray, leave the scene and start the next path, before those that have met
+// surfaces shade them together. The dearer shading is beside a step of a search, the longer lanes should wait (docs/benchmarks).
+// A ray query is one step, and nothing waits for it.
+int searches_per_shading() {
+    bool is_dear = HAS_TEXTURES || HAS_LIGHT_BVH || environment_is_sampled_by_texels();
+    if (TRACE_BACKEND == TRACE_RAY_QUERY) return 1;
+    if (is_dear) return 8;
+    return 3;
+}
+
 // Longest path; reported when it is met. Roulette ends paths long before.
 const uint BOUNCE_CAP = 65535u;
 
@@ -284,6 +294,7 @@ void leave_scene(inout LaneState lane) {
 // A ray that looks for the nearest surface has met one: adds what it emits and prepares the next ray. False if the path
 // ends.
 bool shade_surface(inout LaneState lane, Hit hit) {
+    if (HAS_STATISTICS) count_shading();
     vec3 view = -lane.ray.direction;
     // A shadow ray has the scattered ray's cone, and leaves it as it is.
     float width = HAS_MIP ? cone_width(lane.cone, hit.t) : 0.0;
@@ -312,33 +323,24 @@ bool shade_surface(inout LaneState lane, Hit hit) {
     return goes_on;
 }
 
-bool shade(inout LaneState lane, Hit hit) {
-    if (hit.triangle.slot != NONE) return shade_surface(lane, hit);
-    leave_scene(lane);
-    return false;
-}
-
 void count_traced(uvec3 kind) {
     uint visits = count_ray(kind);
     if (HAS_COST) aovs.visits = add_count(aovs.visits, visits);
 }
 uvec3 path_ray_kind(LaneState lane) { return lane.bounce == 0u ? RAY_CAMERA : RAY_SCATTERED; }
 
-// The lane's ray has been traced. False if the sample is finished.
-bool advance_path(inout LaneState lane, Hit hit) {
-    lane.rays += 1u;
-    if (HAS_STATISTICS) count_shading_vector();
-    if (COUNTS_VISITS) count_traced(is_shadow_ray(lane) ? RAY_SHADOW : path_ray_kind(lane));
-    if (!is_shadow_ray(lane)) return shade(lane, hit);
+// The lane's ray has been traced, and no surface is to be shaded for it. False if the sample is finished.
+bool advance_without_surface(inout LaneState lane, Hit hit) {
+    if (!is_shadow_ray(lane)) {
+        leave_scene(lane);
+        return false;
+    }
     if (HAS_PANES && lane.ray.any_hit && may_be_pane(hit)) {
         lane.ray.any_hit = false;
         lane.pane_search = 1u;
         return true;
     }
-    bool free = hit.triangle.slot == NONE;
-    // The other case first asks what was met.
-    if (HAS_PANES && lane.pane_search != 0u && !free) return shade(lane, hit);
-    return finish_shadow(lane, free);
+    return finish_shadow(lane, hit.triangle.slot == NONE);
 }
 
 void begin_extras() {
@@ -400,20 +402,41 @@ void follow_path(inout LaneState lane, bool goes_on) {
 
 bool must_wait(LaneState lane) { return lane.rays >= lane.ray_limit || rounds >= ROUNDS_FOR_RAYS; }
 
-// After each round the lane's state is whole: wherever the loop is left, it can go on from there.
+// The lane's next ray, if there is one for it in this dispatch.
+bool next_ray(inout LaneState lane) { return (lane.has_path != 0u || start_next(lane)) && !must_wait(lane); }
+
+void count_ray_of(inout LaneState lane) {
+    lane.rays += 1u;
+    if (COUNTS_VISITS) count_traced(is_shadow_ray(lane) ? RAY_SHADOW : path_ray_kind(lane));
+}
+
+// Between two rays the lane's state is whole: a later dispatch can go on from there.
 void render(inout LaneState lane) {
     Trace trace;
-    if (lane.has_path != 0u) trace_begin(trace, constants, lane.ray, alpha_key(lane));
-    while (true) {
-        rounds += trace_advance_rounds() + shading_rounds() + 1u;
-        if (lane.has_path != 0u) {
+    bool ends = false;
+    bool searches = false;  // or waits with the surface that it has found
+    while (!ends) {
+        for (int i = 0; i < searches_per_shading(); ++i) {
+            rounds += trace_advance_rounds() + 1u;
+            if (!searches && !ends) {
+                searches = next_ray(lane);
+                ends = !searches;
+                if (searches) trace_begin(trace, constants, lane.ray, alpha_key(lane));
+            }
+            if (!searches) continue;
             trace_advance(trace, constants);
-            if (!trace_done(trace)) continue;
-            follow_path(lane, advance_path(lane, trace_hit(trace)));
+            // What met a ray for any hit is nothing that is shaded.
+            bool waits = trace.hit.triangle.slot != NONE && !lane.ray.any_hit;
+            if (!trace_done(trace) || waits) continue;
+            count_ray_of(lane);
+            follow_path(lane, advance_without_surface(lane, trace_hit(trace)));
+            searches = false;
         }
-        if (lane.has_path == 0u && !start_next(lane)) break;
-        if (must_wait(lane)) break;
-        trace_begin(trace, constants, lane.ray, alpha_key(lane));
+        rounds += shading_rounds() + 1u;
+        if (!searches || !trace_done(trace)) continue;
+        count_ray_of(lane);
+        follow_path(lane, shade_surface(lane, trace_hit(trace)));
+        searches = false;
     }
 }
 
@@ -427,7 +450,6 @@ void render_baked(inout LaneState lane) {
         if (must_wait(lane)) break;
         lane.rays += 1u;
         Found found = find_nearest(constants, lane.ray);
-        if (HAS_STATISTICS) count_shading_vector();
         if (COUNTS_VISITS) count_traced(path_ray_kind(lane));
         bool goes_on = false;
         // Behind the one test, the triangle is loaded once for the hit and for shading.
@@ -436,7 +458,6 @@ void render_baked(inout LaneState lane) {
         if (goes_on && lane.ray.any_hit) {
             lane.rays += 1u;
             bool free = !trace_occluded(constants, lane.ray);
-            if (HAS_STATISTICS) count_shading_vector();
             if (COUNTS_VISITS) count_traced(RAY_SHADOW);
             goes_on = finish_shadow(lane, free);
         }

@@ -575,12 +575,14 @@ pub struct RayCounters {
     pub search_vectors: u32,
     /// Triangles tested.
     pub triangles: [u32; 3],
-    /// Times that its subgroup shaded, where this lane was the one to count them.
+    /// Times that its subgroup shaded surfaces, where this lane was the one to count them.
     pub shading_vectors: u32,
     /// Lanes of a subgroup.
     pub vector_width: u32,
+    /// Surfaces shaded.
+    pub shadings: u32,
     /// Unused, zero.
-    pub unused: [u32; 3],
+    pub unused: [u32; 2],
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.

@@ -25,7 +25,8 @@ void count_search_step() {
     if (subgroupElect()) counters.search_vectors = add_count(counters.search_vectors, 1u);
 }
 
-void count_shading_vector() {
+void count_shading() {
+    counters.shadings = add_count(counters.shadings, 1u);
     if (subgroupElect()) counters.shading_vectors = add_count(counters.shading_vectors, 1u);
 }
 

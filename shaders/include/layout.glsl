@@ -166,9 +166,9 @@ struct RayCounters {
     uvec3 triangles;
     uint shading_vectors;
     uint vector_width;
+    uint shadings;
     uint unused_0;
     uint unused_1;
-    uint unused_2;
 };
 
 // Scene-array records, decoded from texels by records.glsl.

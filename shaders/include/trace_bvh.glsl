@@ -276,22 +276,15 @@ void trace_step(inout Trace trace, RenderConstants constants) {
     trace.current = next;
 }
 
-// Steps until the next look at which lanes are done: more leave finished lanes idle, fewer shade for few lanes. Where shading
-// looks up textures, it costs so much more than a step that nearly all lanes should shade together (docs/benchmarks).
+// Steps until the next look at which lanes are done: more leave finished lanes idle, fewer have them do what follows in small
+// groups (docs/benchmarks).
 const int STEPS_PER_ADVANCE = 6;
-const int STEPS_PER_ADVANCE_TEXTURED = 40;
-
-int steps_per_advance() {
-    if (HAS_TEXTURES) return STEPS_PER_ADVANCE_TEXTURED;
-    return STEPS_PER_ADVANCE;
-}
 
 // At most so many rounds of loops has trace_advance.
-uint trace_advance_rounds() { return uint(steps_per_advance()) + 1u; }
+uint trace_advance_rounds() { return uint(STEPS_PER_ADVANCE) + 1u; }
 
 void trace_advance(inout Trace trace, RenderConstants constants) {
-    int steps = steps_per_advance();
-    for (int i = 0; i < steps; ++i) {
+    for (int i = 0; i < STEPS_PER_ADVANCE; ++i) {
         if (trace.current == NONE) break;
         trace_step(trace, constants);
     }

@@ -142,7 +142,7 @@ impl Statistics {
             let width = u64::from(lane.vector_width);
             self.search.busy += u64::from(lane.search_steps);
             self.search.lanes += u64::from(lane.search_vectors) * width;
-            self.shading.busy += lane.rays.iter().map(|&n| u64::from(n)).sum::<u64>();
+            self.shading.busy += u64::from(lane.shadings);
             self.shading.lanes += u64::from(lane.shading_vectors) * width;
             let words: &[u32] = bytemuck::cast_slice(std::slice::from_ref(lane));
             self.is_saturated |= words.contains(&u32::MAX);

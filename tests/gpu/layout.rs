@@ -161,8 +161,8 @@ fn blocks_have_the_same_offsets_on_both_sides() {
     assert_eq!(blocks.aovs.1, size_of::<AovSums>(), "stride of the AOVs");
 
     let mut counters = rust_fields!(RayCounters: rays, search_steps, nodes, search_vectors, triangles, shading_vectors,
-        vector_width, unused);
-    split(&mut counters, "unused", &["_0", "_1", "_2"], "u32");
+        vector_width, shadings, unused);
+    split(&mut counters, "unused", &["_0", "_1"], "u32");
     assert_eq!(shader_fields(&blocks.counters.0), counters);
     assert_eq!(blocks.counters.1, size_of::<RayCounters>(), "stride of the counters");
 }

@@ -188,11 +188,12 @@ fn occupancy_is_a_share() {
         let share = occupancy.share().expect("something ran");
         assert!(share > 0.05 && share <= 1.0, "{share}");
     }
-    // Nothing but a constant environment, and a wall that no ray meets.
-    let wall = rectangle(DVec3::new(100.0, 100.0, 0.0), DVec3::X, DVec3::Y, 0);
-    let mut empty = scene(vec![wall], vec![Material::lambertian("wall", [0.5; 3])], pixel_camera(4.0));
-    empty.environment = Environment::Constant([1.0; 3]);
-    let alike = run_of(&empty);
-    let report = alike.statistics.as_ref().expect("asked for").report();
-    assert_eq!((report.search_occupancy, report.shading_occupancy), (Some(1.0), Some(1.0)), "{report:?}");
+    // A wall that no ray meets, and a black one that every ray does.
+    for (corner, size, shading) in [(100.0, 1.0, None), (-4.0, 8.0, Some(1.0))] {
+        let wall = rectangle(DVec3::new(corner, corner, 0.0), DVec3::X * size, DVec3::Y * size, 0);
+        let mut alike = scene(vec![wall], vec![Material::lambertian("wall", [0.0; 3])], pixel_camera(4.0));
+        alike.environment = Environment::Constant([1.0; 3]);
+        let report = run_of(&alike).statistics.expect("asked for").report();
+        assert_eq!((report.search_occupancy, report.shading_occupancy), (Some(1.0), shading), "{report:?}");
+    }
 }
