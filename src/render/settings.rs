@@ -118,11 +118,6 @@ impl Settings {
         self.sample_range.clone().unwrap_or(0..self.spp)
     }
 
-    /// Whether the error is estimated from replicates.
-    pub fn estimates_error(&self) -> bool {
-        self.estimate || self.target_error.is_some()
-    }
-
     /// The sample indices that a film rendered with these settings holds: a run that ended early has the first ones,
     /// and its pixels may differ in how many.
     pub fn samples_in(&self, film: &Film) -> Range<u32> {
