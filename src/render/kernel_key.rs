@@ -88,7 +88,7 @@ impl KernelKey {
             sampler: settings.sampler,
             replicates: settings.sampler == SamplerKind::Sobol && RunPlan::new(settings).estimates_error(),
             baked: Baked::default(),
-            env_sampling: settings.env_sampling,
+            env_sampling: settings.environment_sampling(),
             aovs: settings.aovs.iter().fold(0, |bits, &aov| bits | aov_bit(aov)),
             statistics: settings.statistics,
         }
