@@ -1,5 +1,5 @@
 # The commands of the project's set-up and its checks; `make help` lists them. Everything goes through `make deps`.
-.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short bench-speed test test-drivers e2e e2e-if-possible stress lint references gallery clean
+.PHONY: help deps build demo bench bench-short bench-peers bench-peers-short bench-speed bench-gpu bench-gpu-short test test-drivers e2e e2e-if-possible stress lint references gallery clean
 .DEFAULT_GOAL := help
 
 help: ## lists these commands
@@ -57,6 +57,12 @@ bench-peers-short: build ## the short form of it for CI: Mitsuba alone, one scen
 
 bench-speed: build ## million paths a second beside Mitsuba 3, five scenes (a few minutes)
 	python3 benches/peers/speed.py
+
+bench-gpu: build ## a report on this machine's GPU: paths a second, back ends, starts, kernels (half an hour)
+	python3 benches/peers/gpu.py
+
+bench-gpu-short: build ## its steps in their smallest form, on whatever device there is (five minutes)
+	python3 benches/peers/gpu.py --short
 
 gallery: build ## renders other people's models to docs/gallery (MODELS=FOLDER; a quarter of an hour on two cores)
 	@test -n "$(MODELS)" || { echo "say where the models are: make gallery MODELS=FOLDER" >&2; exit 2; }

@@ -54,7 +54,13 @@ def mitsuba_environment() -> Path:
 
 
 def choose_mitsuba_variant(mi) -> str:
-    """llvm_ad_rgb where a recent LLVM is found (older ones crash on recent processors), else the slow scalar_rgb."""
+    """llvm_ad_rgb where a recent LLVM is found (older ones crash on recent processors), else the slow scalar_rgb. With
+    SUNFLECK_PEERS_GPU=1 cuda_ad_rgb before both, if there is CUDA."""
+    if os.environ.get("SUNFLECK_PEERS_GPU") == "1" and "cuda_ad_rgb" in mi.variants():
+        import drjit
+
+        if drjit.has_backend(drjit.JitBackend.CUDA):
+            return "cuda_ad_rgb"
     if "DRJIT_LIBLLVM_PATH" not in os.environ:
         found = sorted(glob.glob("/usr/lib/*-linux-gnu/libLLVM.so.*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM.so.*"))
         recent = [path for path in found if path.split(".so.")[1].split(".")[0].isdigit()

@@ -30,6 +30,7 @@ layout(set = 0, binding = 5, std430) buffer AovBlock { AovSums block_aovs[]; };
 layout(set = 0, binding = 6, std430) buffer CounterBlock { RayCounters block_counters[]; };
 layout(set = 0, binding = 7, std430) buffer QueueBlock { SliceQueue queue; };
 layout(push_constant) uniform SliceBlock { SliceConstants slice; };
+#include "include/queue.glsl"
 
 #ifdef DEBUG_PRINTS
 // The dispatch that prints has one lane; behind its result stand what it prints, and an empty header.
@@ -41,12 +42,6 @@ void debug_write(uint header, uvec4 words) {
     results[debug_count] = BlockResult(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, header, words.x, words.y, words.z, words.w);
 }
 #endif
-
-// Rounds of loops that a lane, and so its vector, may have run before it takes no further atom, and before it waits for the next
-// dispatch. Mesa's lavapipe leaves every loop, without a word, once all of an invocation's loops together have had 65,535
-// rounds. The room above is for the longest search of a ray, and for loops that the driver makes.
-const uint ROUNDS_FOR_ATOMS = 24000u;
-const uint ROUNDS_FOR_RAYS = 32000u;
 
 // At most so many rounds has the shading of one hit: a light found in a table or down the light BVH and up again, and a texel
 // of the environment.
@@ -343,45 +338,6 @@ bool advance_without_surface(inout LaneState lane, Hit hit) {
     return finish_shadow(lane, hit.triangle.slot == NONE);
 }
 
-void begin_extras() {
-    if (HAS_AOVS) begin_aovs();
-    if (HAS_STATISTICS) begin_counters();
-    if (COUNTS_VISITS) begin_visits();
-}
-
-void store_extras(uint atom) {
-    if (HAS_AOVS) block_aovs[atom] = aovs;
-    if (HAS_STATISTICS) block_counters[atom] = counters;
-}
-
-// What the block has so far, if the lane goes on with it.
-void load_extras(uint atom) {
-    begin_extras();
-    if (HAS_AOVS) aovs = block_aovs[atom];
-    if (HAS_STATISTICS) counters = block_counters[atom];
-}
-
-void finish_atom(LaneState lane) {
-    results[lane.atom] = block_result(lane);
-    if (HAS_EXTRAS) store_extras(lane.atom);
-    atomicAdd(queue.done, 1u);
-}
-
-// Takes the slice's next atom that has samples; false if none is left.
-bool take_atom(inout LaneState lane) {
-    while (rounds < ROUNDS_FOR_ATOMS) {
-        rounds += 1u;
-        uint atom = atomicAdd(queue.taken, 1u);
-        if (atom >= slice.atoms) break;
-        begin_atom(lane, constants, slice, atom);
-        if (HAS_EXTRAS) begin_extras();
-        if (lane.sample_index < lane.end_sample) return true;
-        finish_atom(lane);
-    }
-    lane.atom = NONE;
-    return false;
-}
-
 // Starts the lane's next sample, of the next atom if its own is finished; false if the slice has no more.
 bool start_next(inout LaneState lane) {
     if (lane.sample_index >= lane.end_sample) {
@@ -446,8 +402,7 @@ void render(inout LaneState lane) {
 void render_baked(inout LaneState lane) {
     while (true) {
         rounds += shading_rounds() + 4u;
-        if (lane.has_path == 0u && !start_next(lane)) break;
-        if (must_wait(lane)) break;
+        if (!next_ray(lane)) break;
         lane.rays += 1u;
         Found found = find_nearest(constants, lane.ray);
         if (COUNTS_VISITS) count_traced(path_ray_kind(lane));

@@ -13,6 +13,7 @@
 //! | [`mod@bench`] | run time against error: repeated renders, their errors to a reference, slopes, verdicts, plots |
 //! | [`shader_test`] | a single shader function against what is expected of it |
 //! | [`watch`] | the shader loop: a worker process that renders, files that change, the page that shows it |
+//! | [`atomic_file`] | writing a file whole or not at all |
 //! | [`error`] | what can end a run, and the exit code each kind has |
 //!
 //! From a scene to an image, as `sunfleck render cornell -o cornell.exr` does it:
@@ -36,6 +37,7 @@
 //! # }
 //! ```
 
+pub mod atomic_file;
 pub mod bench;
 pub mod error;
 pub mod film;

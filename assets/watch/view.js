@@ -86,7 +86,7 @@ function showExposure() {
 /** What `render` does unless it is told otherwise. */
 const DEFAULTS = {
   camera: 0, exposure: 0, tonemap: "clip", integrator: "path", "light-sampling": "mis", mis: "power", sampler: "sobol",
-  "light-choice": "bvh", "env-sampling": "compensated",
+  "light-choice": "bvh", "env-sampling": "auto",
   "max-bounces": null, "look-at": null, aov: "", stats: false,
 };
 

@@ -40,15 +40,19 @@ def arguments():
 
 
 def ratio(pairs) -> dict:
-    """Geometric mean of the ratios of the pairs' rates, with the 95 % interval of Student's t on their logarithms."""
+    """Geometric mean of how many times as long the second of each pair takes as the first, with the 95 % interval of Student's t on their logarithms."""
     import numpy
     from scipy import stats
 
-    logs = numpy.log([mitsuba / sunfleck for sunfleck, mitsuba in pairs])
+    logs = numpy.log([second / first for first, second in pairs])
     mean, half = float(logs.mean()), math.inf
     if len(logs) > 1:
         half = float(stats.t.ppf(0.975, len(logs) - 1) * logs.std(ddof=1) / math.sqrt(len(logs)))
     return {"ratio": math.exp(mean), "low": math.exp(mean - half), "high": math.exp(mean + half)}
+
+
+def interval(ratio) -> str:
+    return f"{ratio['ratio']:.2f} ({ratio['low']:.2f} to {ratio['high']:.2f})"
 
 
 def model_options(chosen) -> dict:
@@ -76,7 +80,7 @@ def model_triangles(path) -> int:
     return json.loads(info)["triangles"]
 
 
-def measure_scene(name, chosen) -> dict:
+def measure_scene(name, chosen, renderers=("sunfleck", "mitsuba")) -> dict:
     from children import Child
     from scenes import SCENES as ALL
 
@@ -86,7 +90,7 @@ def measure_scene(name, chosen) -> dict:
     spp = max(4, chosen.spp // 4) if name == "bumpy_2m" else chosen.spp
     children = {}
     try:
-        for renderer in ("sunfleck", "mitsuba"):
+        for renderer in renderers:
             children[renderer] = Child(renderer, name, chosen.out, chosen.resolution, options, chosen.timeout)
         seconds, rays = {renderer: [] for renderer in children}, None
         for index in range(chosen.pairs + 1):
@@ -106,7 +110,7 @@ def measure_scene(name, chosen) -> dict:
     triangles = model_triangles(chosen.model) if chosen.model else ALL[name]().triangle_count()
     return {"scene": name, "triangles": triangles, "spp": spp, "seconds": seconds,
             "rays_per_path": rays, "best_million_paths_per_second": best, "versions": versions,
-            **ratio(list(zip(seconds["sunfleck"], seconds["mitsuba"])))}
+            **(ratio(list(zip(*(seconds[renderer] for renderer in renderers)))) if len(renderers) > 1 else {})}
 
 
 def table(results) -> str:
@@ -114,9 +118,8 @@ def table(results) -> str:
              "|---|---|---|---|---|---|"]
     for r in results:
         best = r["best_million_paths_per_second"]
-        lines.append(f"| {r['scene']} | {r['triangles']:,} | {best['sunfleck']:.2f} | "
-                     f"{r['rays_per_path']:.2f} | {best['mitsuba']:.2f} | "
-                     f"{r['ratio']:.2f} ({r['low']:.2f} to {r['high']:.2f}) |")
+        peer = f"{best['mitsuba']:.2f} | {interval(r)}" if "mitsuba" in best else "– | –"
+        lines.append(f"| {r['scene']} | {r['triangles']:,} | {best['sunfleck']:.2f} | {r['rays_per_path']:.2f} | {peer} |")
     return "\n".join(lines)
 
 

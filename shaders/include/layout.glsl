@@ -1,4 +1,4 @@
-// Every struct and constant shared with the host. The other half is src/layout.rs, where each field is documented;
+// Every struct and constant shared with the host. The other half is src/layout/, where each field is documented;
 // tests/gpu/layout.rs holds the two together.
 #ifndef LAYOUT_GLSL
 #define LAYOUT_GLSL

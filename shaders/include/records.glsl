@@ -90,7 +90,7 @@ struct TriangleVertices {
     vec3 c;
 };
 
-// By the triangle's number: see LeafSlot in src/layout.rs.
+// By the triangle's number: see LeafSlot in src/layout/bvh.rs.
 TriangleVertices load_triangle(uint number) {
     uint base = (number >> 1u) * SLOT_TEXELS;
     uvec4 q0 = LOAD4(SLOTS, base);

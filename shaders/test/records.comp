@@ -1,6 +1,6 @@
 #version 460
 // The decoders of records.glsl and geometry.glsl: lane i loads record i of each table and writes its fields, texel by
-// texel in the order in which they are documented in src/layout.rs.
+// texel in the order in which they are documented in src/layout/.
 #include "../include/test_kernel.glsl"
 #include "../include/attributes.glsl"
 #include "../include/geometry.glsl"

@@ -10,7 +10,7 @@ use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
 use super::measure::Measurement;
-use crate::film::output::write_atomically;
+use crate::atomic_file::write_atomically;
 use crate::film::png::write_png;
 use crate::{Error, Result};
 

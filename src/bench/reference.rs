@@ -70,7 +70,7 @@ impl ReferenceInfo {
 }
 
 impl Reference {
-    /// The reference in an EXR file. Its `variance` channel is used if it has one.
+    /// The reference in an EXR file. Its `variance` channel is used if the file says that its samples are independent.
     ///
     /// # Errors
     /// A file that is missing or no image, has no colours, another resolution than `size`, or no finite pixel.
@@ -87,18 +87,20 @@ impl Reference {
         if !(0..image.mean.len()).any(|pixel| image.is_finite(pixel)) {
             return Err(Error::input(path, "has no finite pixel"));
         }
-        let key = file.metadata.kernel_key.as_deref().unwrap_or_default();
-        // Sobol' points: the layer is an upper bound, which must not be subtracted.
-        let bound = key.split(' ').any(|word| word.starts_with(SamplerKind::Sobol.name()));
-        if bound {
+        // Of samples that complete each other the layer is an upper bound, which must not be subtracted.
+        let sampler = file.metadata.sampler.as_deref().and_then(|name| name.parse().ok());
+        let independent = sampler == Some(SamplerKind::Independent);
+        if !independent {
             image.variance.fill([0.0; 3]);
         }
-        let noise = if bound {
-            "its samples are those of the Sobol' sampler: it is taken as exact, and nothing is subtracted"
-        } else if file.values(VARIANCE_CHANNEL).is_some() {
-            "variance from the file's own layer, taken as grey in proportion to each pixel, and subtracted"
-        } else {
-            "the file has no variance layer: it is taken as exact, and nothing is subtracted"
+        let noise = match file.values(VARIANCE_CHANNEL) {
+            None => "the file has no variance layer: it is taken as exact, and nothing is subtracted",
+            Some(_) if independent => {
+                "variance from the file's own layer, taken as grey in proportion to each pixel, and subtracted"
+            }
+            Some(_) => {
+                "the file does not say that its samples are independent: it is taken as exact, and nothing is subtracted"
+            }
         };
         let spp = file.metadata.samples_per_pixel.map(f64::from);
         let mut reference = Self::new(image, path.display().to_string(), noise.to_owned(), spp, None);

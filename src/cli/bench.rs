@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
+use sunfleck::atomic_file::{check_writable, write_atomically};
 use sunfleck::bench::measure::{Measurement, measure};
 use sunfleck::bench::plan::{Budget, Plan, ReferenceChoice};
 use sunfleck::bench::plot::{self, PlotFormat};
-use sunfleck::film::output::{check_writable, write_atomically};
 use sunfleck::render::{OpenDevice, Settings, open_device};
 use sunfleck::scene::Scene;
 use sunfleck::{Error, Result};

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
+use sunfleck::atomic_file::check_writable;
 use sunfleck::film::exr::{ExrImage, read_exr};
 use sunfleck::film::metrics::{Difference, compare, flip, magma};
-use sunfleck::film::output::{ImageFormat, check_writable};
+use sunfleck::film::output::ImageFormat;
 use sunfleck::film::png::write_png;
 use sunfleck::film::tonemap::ToneMap;
 use sunfleck::{Error, Result};

@@ -60,9 +60,9 @@ pub(crate) struct EstimatorArgs {
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true, value_parser = parse::finite, help_heading = "Environment")]
     env_rotation: f64,
     /// How directions to the environment are chosen: by what is brighter than its mean, the rest being left to BSDF samples; by
-    /// brightness; or evenly.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse::named::<EnvironmentSampling>(EnvironmentSampling::NAMES), help_heading = "Environment")]
-    env_sampling: EnvironmentSampling,
+    /// brightness; or evenly [default: compensated, or importance with --light-sampling nee].
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<EnvironmentSampling>(EnvironmentSampling::NAMES), help_heading = "Environment")]
+    env_sampling: Option<EnvironmentSampling>,
 
     /// Device to render on: a number or a part of a name (see `sunfleck devices`), all, or auto.
     #[arg(long, value_name = "NAME|INDEX|all|auto", default_value_t, help_heading = "Device")]
@@ -102,6 +102,9 @@ impl EstimatorArgs {
         if let Some(most) = self.clamp_indirect {
             add("clamp-indirect", most.to_string());
         }
+        if let Some(sampling) = self.env_sampling {
+            add("env-sampling", sampling.to_string());
+        }
         let default = Settings::default();
         let named = [
             ("integrator", self.integrator.name(), default.integrator.name()),
@@ -109,7 +112,6 @@ impl EstimatorArgs {
             ("light-sampling", self.light_sampling.name(), default.light_sampling.name()),
             ("light-choice", self.light_choice.name(), default.light_choice.name()),
             ("mis", self.mis.name(), default.mis_heuristic.name()),
-            ("env-sampling", self.env_sampling.name(), default.env_sampling.name()),
             ("trace", self.trace.name(), default.trace.name()),
             ("bvh-quality", self.bvh_quality.name(), default.bvh_quality.name()),
         ];

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
+use sunfleck::atomic_file::check_writable;
 use sunfleck::film::exr::{ExrImage, read_exr};
 use sunfleck::film::merge::merge;
-use sunfleck::film::output::{ImageFormat, check_writable};
+use sunfleck::film::output::ImageFormat;
 use sunfleck::film::png::{tone_map_srgb8, write_png};
 use sunfleck::{Error, Result};
 

@@ -171,6 +171,7 @@ fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {
         kernel_key: Some(result.kernel_key.clone()),
         scene: Some(scene.name.clone()),
         integrator: Some(job.settings.integrator.to_string()),
+        sampler: Some(job.settings.sampler.to_string()),
         clamp_indirect: job.settings.clamp_indirect,
         estimated_error: result.error_estimate.map(|e| e.error as f32),
         estimated_error_interval: result.error_estimate.map(|e| e.interval.map(|bound| bound as f32)),

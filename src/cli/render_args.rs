@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
+use sunfleck::atomic_file::check_writable;
 use sunfleck::film::aov::Aov;
 use sunfleck::film::aov_picture::picture_path;
-use sunfleck::film::output::{ImageFormat, check_writable};
+use sunfleck::film::output::ImageFormat;
 use sunfleck::film::tonemap::ToneMap;
 use sunfleck::render::{PixelFilter, Settings};
 use sunfleck::watch::messages::Pose;

@@ -19,8 +19,8 @@ use exr::prelude::{Compression, ImageAttributes, IntegerBounds, LayerAttributes,
 use exr::prelude::{WritableImage, read};
 
 use super::metadata::Metadata;
-use super::output::write_atomically;
 use super::{Film, PixelSums};
+use crate::atomic_file::write_atomically;
 use crate::{Error, Result};
 
 /// Name of the channel of sample counts.

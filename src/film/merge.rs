@@ -147,6 +147,7 @@ fn merged_metadata(parts: &[Part]) -> Metadata {
         (&mut metadata.kernel_key, (|m| &m.kernel_key) as fn(&Metadata) -> &Option<String>),
         (&mut metadata.device, |m| &m.device),
         (&mut metadata.scene, |m| &m.scene),
+        (&mut metadata.sampler, |m| &m.sampler),
     ] {
         if all.iter().any(|m| get(m) != mine) {
             *mine = None;

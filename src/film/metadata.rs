@@ -33,6 +33,8 @@ pub struct Metadata {
     pub scene: Option<String>,
     /// `integrator` (string).
     pub integrator: Option<String>,
+    /// `sampler` (string): how its samples were drawn.
+    pub sampler: Option<String>,
     /// `clampIndirect` (float): the bound of an image whose indirect light was cut off; a biased one.
     pub clamp_indirect: Option<f32>,
     /// `estimatedError` (float): relative, see [`super::replicates::ErrorEstimate`].
@@ -120,6 +122,7 @@ impl Metadata {
             ("kernelKey", self.kernel_key.as_ref()),
             ("scene", self.scene.as_ref()),
             ("integrator", self.integrator.as_ref()),
+            ("sampler", self.sampler.as_ref()),
             ("device", self.device.as_ref()),
         ];
         let others = self.other.iter().map(|(name, value)| (name.as_str(), Some(value)));
@@ -152,6 +155,7 @@ impl Metadata {
                 ("kernelKey", AttributeValue::Text(v)) => metadata.kernel_key = Some(string(v)),
                 ("scene", AttributeValue::Text(v)) => metadata.scene = Some(string(v)),
                 ("integrator", AttributeValue::Text(v)) => metadata.integrator = Some(string(v)),
+                ("sampler", AttributeValue::Text(v)) => metadata.sampler = Some(string(v)),
                 ("device", AttributeValue::Text(v)) => metadata.device = Some(string(v)),
                 (other, AttributeValue::Text(v)) => drop(metadata.other.insert(other.to_owned(), string(v))),
                 _ => {}

@@ -6,9 +6,9 @@ use std::path::Path;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::output::write_atomically;
 use super::tonemap::{ToneMap, to_srgb8};
 use crate::Result;
+use crate::atomic_file::write_atomically;
 
 /// What a pixel with a NaN or an infinity looks like, so that it is seen: magenta.
 pub const NON_FINITE_SRGB8: [u8; 3] = [255, 0, 255];

@@ -5,6 +5,8 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::atomic_file::write_atomically;
+
 /// `$XDG_CACHE_HOME/sunfleck`, or `~/.cache/sunfleck`; `None` where there is no home. It need not exist.
 pub(super) fn cache_folder() -> Option<PathBuf> {
     let variable = |name| env::var_os(name).filter(|value| !value.is_empty());
@@ -12,15 +14,9 @@ pub(super) fn cache_folder() -> Option<PathBuf> {
     variable("XDG_CACHE_HOME").map(PathBuf::from).or_else(home).map(|folder| folder.join("sunfleck"))
 }
 
-/// Writes the parts to a file beside the old one and renames it, so that another process reads the old or the new one. The
-/// folder is made if it is not there.
-pub(super) fn replace_file(path: &Path, parts: &[&[u8]]) -> io::Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    for part in parts {
-        file.write_all(part)?;
-    }
-    file.persist(path)?;
-    Ok(())
+/// Writes the parts to a file of the cache, which another process then reads whole: the old one or the new one. The folder
+/// is made if it is not there.
+pub(super) fn write_parts(path: &Path, parts: &[&[u8]]) -> io::Result<()> {
+    fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+    write_atomically(path, |file| parts.iter().try_for_each(|part| file.write_all(part))).map_err(io::Error::other)
 }

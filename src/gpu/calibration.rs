@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::cache_folder::{cache_folder, replace_file};
+use super::cache_folder::{cache_folder, write_parts};
 use super::{ArrayForm, DeviceInfo, TraceBackend};
 
 /// Repeated measurements of one variant differ by a few percent, on a machine that does other things too.
@@ -74,7 +74,7 @@ impl Calibration {
     /// When the file cannot be written.
     pub fn store(&self, info: &DeviceInfo) -> io::Result<PathBuf> {
         let path = path(&info.identity).ok_or_else(|| io::Error::other("there is no folder for caches"))?;
-        replace_file(&path, &[&serde_json::to_vec_pretty(self)?])?;
+        write_parts(&path, &[&serde_json::to_vec_pretty(self)?])?;
         Ok(path)
     }
 }

@@ -12,7 +12,7 @@ use std::sync::Mutex;
 
 use ash::vk;
 
-use super::cache_folder::{cache_folder, replace_file};
+use super::cache_folder::{cache_folder, write_parts};
 use super::{GpuError, GpuResult};
 
 /// What a file begins with: the format and its version, then the length and the hash of the data, 8 bytes each.
@@ -95,7 +95,7 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 fn write(path: &Path, data: &[u8]) -> io::Result<()> {
-    replace_file(path, &[MAGIC, &(data.len() as u64).to_le_bytes(), &hash(data).to_le_bytes(), data])
+    write_parts(path, &[MAGIC, &(data.len() as u64).to_le_bytes(), &hash(data).to_le_bytes(), data])
 }
 
 #[cfg(test)]

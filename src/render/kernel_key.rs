@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::bake::Baked;
-use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, SamplerKind, Settings};
+use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, RunPlan, SamplerKind, Settings};
 use crate::film::aov::Aov;
 use crate::gpu::{ArrayForm, TraceBackend};
 use crate::layout::{AOV_ALBEDO, AOV_COST, AOV_COVERAGE, AOV_DEPTH, AOV_NORMAL, AOV_POSITION};
@@ -86,9 +86,9 @@ impl KernelKey {
             light_sampling: settings.light_sampling,
             mis_heuristic: settings.mis_heuristic,
             sampler: settings.sampler,
-            replicates: settings.sampler == SamplerKind::Sobol && settings.estimates_error(),
+            replicates: settings.sampler == SamplerKind::Sobol && RunPlan::new(settings).estimates_error(),
             baked: Baked::default(),
-            env_sampling: settings.env_sampling,
+            env_sampling: settings.environment_sampling(),
             aovs: settings.aovs.iter().fold(0, |bits, &aov| bits | aov_bit(aov)),
             statistics: settings.statistics,
         }

@@ -53,7 +53,7 @@ use crate::{Error, Result};
 pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Prepared> {
     let options = PrepareOptions {
         camera: camera.camera_to_world.translation,
-        environment_sampling: settings.env_sampling,
+        environment_sampling: settings.environment_sampling(),
         mip: settings.mip,
         light_choice: settings.light_choice,
         bvh_quality: settings.bvh_quality,

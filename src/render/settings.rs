@@ -48,8 +48,8 @@ pub struct Settings {
     pub clamp_indirect: Option<f32>,
     /// How [`LightSampling::Mis`] weighs its two samples.
     pub mis_heuristic: MisHeuristic,
-    /// How directions to an image environment are chosen.
-    pub env_sampling: EnvironmentSampling,
+    /// How directions to an image environment are chosen; `None` leaves it to [`Settings::environment_sampling`].
+    pub env_sampling: Option<EnvironmentSampling>,
     /// The pixel filter.
     pub filter: PixelFilter,
     /// What is kept besides radiance, each once.
@@ -95,7 +95,7 @@ impl Default for Settings {
             light_choice: LightChoice::default(),
             clamp_indirect: None,
             mis_heuristic: MisHeuristic::default(),
-            env_sampling: EnvironmentSampling::default(),
+            env_sampling: None,
             filter: PixelFilter::default(),
             aovs: Vec::new(),
             statistics: false,
@@ -118,9 +118,13 @@ impl Settings {
         self.sample_range.clone().unwrap_or(0..self.spp)
     }
 
-    /// Whether the error is estimated from replicates.
-    pub fn estimates_error(&self) -> bool {
-        self.estimate || self.target_error.is_some()
+    /// How directions to an image environment are chosen: what is set, or else what suits the light sampling. MIS
+    /// compensation leaves to BSDF samples what is not brighter than the mean, and [`LightSampling::Nee`] has none.
+    pub fn environment_sampling(&self) -> EnvironmentSampling {
+        self.env_sampling.unwrap_or(match self.light_sampling {
+            LightSampling::Nee => EnvironmentSampling::Importance,
+            LightSampling::Mis | LightSampling::Mixture | LightSampling::Bsdf => EnvironmentSampling::Compensated,
+        })
     }
 
     /// The sample indices that a film rendered with these settings holds: a run that ended early has the first ones,

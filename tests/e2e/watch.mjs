@@ -242,7 +242,7 @@ try {
   await step("other estimators", async () => {
     const light = await mean();
     const starts = () => page.evaluate(() => document.body.dataset.start);
-    for (const [id, value, isDefault] of [["light-sampling", "bsdf"], ["light-sampling", "mis", true], ["sampler", "independent"], ["sampler", "sobol", true], ["light-choice", "uniform"], ["light-choice", "bvh", true], ["env-sampling", "importance"], ["env-sampling", "compensated", true]]) {
+    for (const [id, value, isDefault] of [["light-sampling", "bsdf"], ["light-sampling", "mis", true], ["sampler", "independent"], ["sampler", "sobol", true], ["light-choice", "uniform"], ["light-choice", "bvh", true], ["env-sampling", "importance"], ["env-sampling", "auto", true]]) {
       const before = await starts();
       await page.selectOption(`#${id}`, value);
       await page.waitForFunction((before) => document.body.dataset.start !== before, before, { timeout: 60000 });

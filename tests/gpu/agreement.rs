@@ -102,7 +102,7 @@ fn environment_samplings_agree() {
         (EnvironmentSampling::Uniform, LightSampling::Nee),
         (EnvironmentSampling::Importance, LightSampling::Bsdf),
     ] {
-        let other = Settings { env_sampling, light_sampling, ..settings.clone() };
+        let other = Settings { env_sampling: Some(env_sampling), light_sampling, ..settings.clone() };
         assert_agree(&format!("compensated mis and {env_sampling} {light_sampling}"), reference, mean(&scene, &other));
     }
 }

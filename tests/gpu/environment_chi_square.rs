@@ -110,7 +110,11 @@ fn images() -> Vec<Image> {
 
 fn kernel_for(image: &Image, env_sampling: EnvironmentSampling) -> TestKernel {
     let scene = Scene { environment: image.environment(), ..empty_scene() };
-    TestKernel::with_settings("environment.comp", &scene, &Settings { env_sampling, ..settings(64, 64) })
+    TestKernel::with_settings(
+        "environment.comp",
+        &scene,
+        &Settings { env_sampling: Some(env_sampling), ..settings(64, 64) },
+    )
 }
 
 fn kernel(image: &Image) -> TestKernel {

@@ -1,4 +1,4 @@
-//! src/layout.rs and shaders/include/layout.glsl are the same: blocks by reflection of the SPIR-V, records of the scene
+//! src/layout/ and shaders/include/layout.glsl are the same: blocks by reflection of the SPIR-V, records of the scene
 //! arrays by a kernel that decodes them, constants by the texts.
 
 use std::any::type_name_of_val;
@@ -201,10 +201,16 @@ fn value(text: &str) -> u32 {
     parsed.unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
+/// All files of src/layout/, one behind another.
+fn rust_text() -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/layout");
+    let files = std::fs::read_dir(folder).expect("src/layout").map(|entry| entry.expect("an entry").path());
+    files.map(|file| std::fs::read_to_string(file).expect("a file of src/layout")).collect()
+}
+
 #[test]
 fn constants_have_the_same_values_on_both_sides() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/layout.rs");
-    let rust = parse_constants(&std::fs::read_to_string(file).expect("src/layout.rs"), "pub const ");
+    let rust = parse_constants(&rust_text(), "pub const ");
     let rust: BTreeMap<_, _> =
         rust.iter().filter(|(name, _)| !name.contains(':')).map(|(n, v)| (n, value(v))).collect();
     let shader = parse_constants(&gpu::sources()["include/layout.glsl"], "const uint ");

@@ -41,6 +41,14 @@ mutations! {
     dropped_jacobian: "include/environment.glsl",
         "image.w > 0.0 ? image.w / sine : 0.0" => "image.w",
         caught by "environment_chi_square::importance_sampling_follows_the_pdf";
+    /// What the compensated density leaves of a dim sky is forgotten: BSDF samples bring it in full, light samples again.
+    forgotten_sky: "include/environment.glsl",
+        "image.w > 0.0 ? image.w / sine : 0.0" => "image.w > 0.25 * INV_PI ? image.w / sine : 0.0",
+        caught by "agreement::environment_samplings_agree";
+    /// Small densities are raised, so that no sample is ever bright.
+    raised_density: "include/environment.glsl",
+        "image.rgb, image.w / polar.y)" => "image.rgb, max(image.w, 0.25 * INV_PI) / polar.y)",
+        caught by "environment_chi_square::samples_agree_with_lookups";
     /// A lamp's density per area, not per solid angle.
     dropped_distance: "include/light.glsl",
         "pick / point.area * (distance * distance) / abs(cosine)" => "pick / point.area / abs(cosine)",

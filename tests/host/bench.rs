@@ -6,6 +6,9 @@ use sunfleck::bench::mean_image::{ImageAccumulator, MeanImage};
 use sunfleck::bench::own_reference::other_estimator;
 use sunfleck::bench::reference::Reference;
 use sunfleck::bench::statistics::{Interval, sidak, t_quantile};
+use sunfleck::film::Film;
+use sunfleck::film::exr::ExrImage;
+use sunfleck::film::metadata::Metadata;
 use sunfleck::gpu::{DeviceKind, TraceBackend};
 use sunfleck::render::{LightSampling, Settings, TraceChoice};
 
@@ -184,4 +187,20 @@ fn the_noise_of_the_reference_is_subtracted() {
     let half = (interval.high - interval.estimate) * 4.0 / 2.02;
     assert!((interval.estimate - truth).abs() < half, "{interval:?}, {truth}");
     assert!((interval.estimate - biased).abs() > half, "the test could not tell: {interval:?}, {biased}");
+}
+
+/// Of the Sobol' sampler the variance channel is an upper bound, and so it may be where nothing is said.
+#[test]
+fn the_variance_of_a_file_is_subtracted_if_its_samples_are_independent() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("reference.exr");
+    let mut film = Film::new(1, 1);
+    film.add_block(0, [4.0; 3], 5.0, 4);
+    let variance = film.pixels()[0].variance_of_mean().unwrap();
+    for (sampler, noise) in [(Some("independent"), variance), (Some("sobol"), 0.0), (None, 0.0)] {
+        let metadata = Metadata { sampler: sampler.map(str::to_owned), ..Metadata::default() };
+        ExrImage::from_film(&film, metadata).write(&path).unwrap();
+        let about = Reference::read(&path, (1, 1)).unwrap().about;
+        assert!((about.noise_mse - noise).abs() < 1e-6, "{sampler:?}: {} for {noise}", about.noise_mse);
+    }
 }

@@ -4,12 +4,13 @@ use std::fs;
 use std::path::Path;
 
 use glam::{DAffine3, DMat4, DVec3, Mat4, Vec4};
+use sunfleck::atomic_file::{check_writable, write_atomically};
 use sunfleck::film::Film;
 use sunfleck::film::exr::{ChannelValues, ExrImage, read_exr};
 use sunfleck::film::metadata::{
     Metadata, REC709_CHROMATICITIES, software, world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective,
 };
-use sunfleck::film::output::{ImageFormat, check_writable, write_atomically};
+use sunfleck::film::output::ImageFormat;
 use sunfleck::film::png::{NON_FINITE_SRGB8, tone_map_srgb8, write_png};
 use sunfleck::film::tonemap::{ToneMap, srgb_encode, to_srgb8};
 
@@ -39,6 +40,7 @@ fn metadata() -> Metadata {
         kernel_key: Some("bvh/w4/µ".to_owned()),
         scene: Some("cornell".to_owned()),
         integrator: Some("path".to_owned()),
+        sampler: Some("sobol".to_owned()),
         clamp_indirect: Some(10.0),
         estimated_error: Some(0.25),
         estimated_error_interval: Some([0.125, 0.5]),

@@ -143,6 +143,7 @@ impl Shown {
             kernel_key: Some(key),
             scene: Some(scene),
             integrator: Some(settings.integrator.to_string()),
+            sampler: Some(settings.sampler.to_string()),
             clamp_indirect: settings.clamp_indirect,
             ..Metadata::default()
         }

@@ -1,0 +1,52 @@
+// The slice's atoms: how a lane takes one, and what it brings back of it. It stands on the kernel's bindings and on aov.glsl,
+// which path_trace.comp includes.
+#ifndef QUEUE_GLSL
+#define QUEUE_GLSL
+#include "lane.glsl"
+
+// Rounds of loops that a lane, and so its vector, may have run before it takes no further atom, and before it waits for the next
+// dispatch. Mesa's lavapipe leaves every loop, without a word, once all of an invocation's loops together have had 65,535
+// rounds. The room above is for the longest search of a ray, and for loops that the driver makes.
+const uint ROUNDS_FOR_ATOMS = 24000u;
+const uint ROUNDS_FOR_RAYS = 32000u;
+
+void begin_extras() {
+    if (HAS_AOVS) begin_aovs();
+    if (HAS_STATISTICS) begin_counters();
+    if (COUNTS_VISITS) begin_visits();
+}
+
+void store_extras(uint atom) {
+    if (HAS_AOVS) block_aovs[atom] = aovs;
+    if (HAS_STATISTICS) block_counters[atom] = counters;
+}
+
+// What the block has so far, if the lane goes on with it.
+void load_extras(uint atom) {
+    begin_extras();
+    if (HAS_AOVS) aovs = block_aovs[atom];
+    if (HAS_STATISTICS) counters = block_counters[atom];
+}
+
+void finish_atom(LaneState lane) {
+    results[lane.atom] = block_result(lane);
+    if (HAS_EXTRAS) store_extras(lane.atom);
+    atomicAdd(queue.done, 1u);
+}
+
+// Takes the slice's next atom that has samples; false if none is left.
+bool take_atom(inout LaneState lane) {
+    while (rounds < ROUNDS_FOR_ATOMS) {
+        rounds += 1u;
+        uint atom = atomicAdd(queue.taken, 1u);
+        if (atom >= slice.atoms) break;
+        begin_atom(lane, constants, slice, atom);
+        if (HAS_EXTRAS) begin_extras();
+        if (lane.sample_index < lane.end_sample) return true;
+        finish_atom(lane);
+    }
+    lane.atom = NONE;
+    return false;
+}
+
+#endif

@@ -1,0 +1,67 @@
+//! A slice of a render: what a dispatch is asked for, and the sums of radiance that it brings.
+
+use bytemuck::{Pod, Zeroable};
+
+/// What a slice renders: the atoms `0..atoms`, atom i being block `first_block` + a / pixels of pixel a mod pixels with
+/// a = `first_atom` + i. Lanes `0..lanes` take them from a [`SliceQueue`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct SliceConstants {
+    /// First atom, counted within `first_block`.
+    pub first_atom: u32,
+    /// Number of lanes.
+    pub lanes: u32,
+    /// Aligned block of 16 sample indices that `first_atom` belongs to.
+    pub first_block: u32,
+    /// A lane saves its state after this many rays of an atom and goes on in the next dispatch.
+    pub ray_budget: u32,
+    /// 1 if the lanes go on from their saved state.
+    pub resume: u32,
+    /// Number of atoms.
+    pub atoms: u32,
+    /// 1 if the only lane writes what it prints behind its result (shaders/include/debug.glsl).
+    pub prints: u32,
+    /// Unused, zero.
+    pub unused: u32,
+}
+
+/// The atoms of a slice, of which a lane takes the next when it has finished one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct SliceQueue {
+    /// Times that an atom was asked for; beyond `atoms` there was none.
+    pub taken: u32,
+    /// Atoms that are complete.
+    pub done: u32,
+}
+
+/// Most values that a lane prints.
+pub const DEBUG_RECORDS: u32 = 64;
+
+/// Samples of an aligned block.
+pub const BLOCK_SAMPLES: u32 = 16;
+
+/// The result of one atom: the sums over the samples of one pixel and block.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BlockResult {
+    /// Sum of radiance; the exact sum is `sum + compensation`.
+    pub sum: [f32; 3],
+    /// Sum of squared sample luminance.
+    pub luminance_squared: f32,
+    /// Low part of the compensated sum.
+    pub compensation: [f32; 3],
+    /// Rays traced.
+    pub rays: u32,
+    /// Bit i: sample i of the block was not finite.
+    pub non_finite: u32,
+    /// Bit i: a path of sample i was cut off by the safety cap on bounces.
+    pub capped: u32,
+    /// Paths that were ended in this block (samples).
+    pub samples: u32,
+    /// Unused, zero.
+    pub unused: u32,
+}
+
+/// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.
+pub const LANE_STATE_BYTES: usize = 304;
