@@ -43,6 +43,7 @@ pub mod error;
 pub mod film;
 pub mod gpu;
 pub mod layout;
+mod memo;
 mod named_enum;
 pub mod prepare;
 mod random;

@@ -1,4 +1,4 @@
-// Mouse and keys.
+// Mouse, fingers and keys.
 
 import { dolly, orbit, pan } from "./camera.js";
 import { hover, pin } from "./inspect.js";
@@ -12,26 +12,46 @@ const MODES = { w: "wipe", d: "difference", h: "heat", a: "a", b: "b" };
 /** `compare(mode)` changes what is shown of before and after. */
 export function listen(picture, compare) {
   const canvas = picture.canvas;
+  /** Where pointers are down, by their ids; two of them are fingers. */
+  const down = new Map();
   let held = null;
+  /** What two fingers began with: by all they did since, the camera is where it would be had they done it at once. */
+  let pinch = null;
+  const spread = () => {
+    const [a, b] = [...down.values()];
+    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.max(Math.hypot(a.x - b.x, a.y - b.y), 1) };
+  };
 
   canvas.onpointerdown = (event) => {
-    held = { x: event.clientX, y: event.clientY, moved: false, pans: event.shiftKey || event.button !== 0 };
-    canvas.setPointerCapture(event.pointerId);
+    const { pointerId, clientX: x, clientY: y } = event;
+    if (down.size === 2) return;
+    held = { moved: down.size > 0, pans: event.shiftKey || event.button !== 0 };
+    down.set(pointerId, { x, y });
+    if (down.size === 2 && state.status?.ready) pinch = { pose: pose(), ...spread() };
+    canvas.setPointerCapture(pointerId);
     canvas.classList.add("held");
   };
   canvas.onpointermove = (event) => {
-    if (!held) return hover(picture.pixelAt(event.clientX, event.clientY));
-    const [x, y] = [event.clientX - held.x, event.clientY - held.y];
+    const { pointerId, clientX, clientY } = event;
+    const from = down.get(pointerId);
+    if (!from) return event.pointerType === "touch" || hover(picture.pixelAt(clientX, clientY));
+    const [x, y] = [clientX - from.x, clientY - from.y];
     if (!held.moved && Math.hypot(x, y) < 3) return;
-    Object.assign(held, { x: event.clientX, y: event.clientY, moved: true });
+    down.set(pointerId, { x: clientX, y: clientY });
+    held.moved = true;
     if (!state.status?.ready) return;
     const height = canvas.clientHeight;
-    move(held.pans ? pan(pose(), -x / height, y / height) : orbit(pose(), (4 * x) / height, (4 * y) / height));
+    if (pinch) {
+      const now = spread();
+      move(pan(dolly(pinch.pose, pinch.apart / now.apart), (pinch.x - now.x) / height, (now.y - pinch.y) / height));
+    } else move(held.pans ? pan(pose(), -x / height, y / height) : orbit(pose(), (4 * x) / height, (4 * y) / height));
   };
-  canvas.onpointerup = (event) => {
-    if (held && !held.moved) pin(picture.pixelAt(event.clientX, event.clientY), picture);
-    held = null;
-    canvas.classList.remove("held");
+  canvas.onpointerup = canvas.onpointercancel = (event) => {
+    const { type, pointerId, clientX, clientY } = event;
+    if (!down.delete(pointerId)) return;
+    pinch = null;
+    if (type === "pointerup" && !held.moved) pin(picture.pixelAt(clientX, clientY), picture);
+    canvas.classList.toggle("held", down.size > 0);
   };
   canvas.oncontextmenu = (event) => event.preventDefault();
   canvas.addEventListener("wheel", (event) => {

@@ -43,7 +43,8 @@ export function showEdits(status) {
     head.title = row.title = `${report.what}: GLSL to SPIR-V ${ms(report.compile_ms)}, the driver's build ${ms(report.build_ms)}, `
       + `save to the first image ${ms(report.first_image_ms)}; ${report.spp} samples per pixel`;
     const name = report.what.replaceAll(/[^ ,]*\//g, "");
-    const named = element("td", `${report.edit} ${name}`);
+    const more = [report.reused, report.is_superseded && `superseded at ${report.spp} spp`].filter(Boolean);
+    const named = element("td", [`${report.edit} ${name}`, ...more].join(": "));
     named.colSpan = 5;
     head.append(named);
     const cells = [

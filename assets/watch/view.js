@@ -3,8 +3,9 @@
 
 import { $, say, state } from "./state.js";
 
-/** Controls whose value is a word of the view. */
-const NAMED = { integrator: "integrator", light_sampling: "light-sampling", mis: "mis", light_choice: "light-choice", env_sampling: "env-sampling", sampler: "sampler", tonemap: "tonemap", shown: "shown" };
+const idOf = (field) => field.replaceAll("_", "-");
+/** Fields of the view whose value is a name, with their names and defaults. */
+const choices = () => state.status.choices;
 
 let waiting = false;
 let dirty = false;
@@ -35,7 +36,13 @@ export function move(pose) {
 /** The server's view, when the page has none. */
 export function takeView(view) {
   state.view = { ...view, moving: false };
-  for (const [field, id] of Object.entries(NAMED)) $(id).value = view[field];
+  for (const { field, names } of choices()) {
+    const select = $(idOf(field));
+    select.replaceChildren(...names.map((name) => new Option(name)));
+    select.value = view[field];
+    select.onchange = () => changeView({ [field]: select.value });
+  }
+  $("shown").value = view.shown;
   $("max-bounces").value = view.max_bounces ?? "";
   $("exposure").value = view.exposure;
   $("debug").checked = view.debug;
@@ -61,9 +68,7 @@ export function listShown(aovs) {
   select.value = state.view?.shown ?? state.status.view.shown;
 }
 
-for (const [field, id] of Object.entries(NAMED)) {
-  $(id).onchange = (event) => changeView({ [field]: event.target.value });
-}
+$("shown").onchange = (event) => changeView({ shown: event.target.value });
 $("camera").onchange = (event) => changeView({ camera: Number(event.target.value), pose: null });
 $("max-bounces").onchange = (event) => {
   const { value, validity } = event.target;
@@ -83,34 +88,34 @@ function showExposure() {
 
 // ---- The command that renders this view
 
-/** What `render` does unless it is told otherwise. */
-const DEFAULTS = {
-  camera: 0, exposure: 0, tonemap: "clip", integrator: "path", "light-sampling": "mis", mis: "power", sampler: "sobol",
-  "light-choice": "bvh", "env-sampling": "auto",
-  "max-bounces": null, "look-at": null, aov: "", stats: false,
-};
+/** What `render` does unless it is told otherwise, by its flags. */
+const defaults = () => ({
+  camera: 0, exposure: 0, "max-bounces": null, "look-at": null, aov: "", stats: false,
+  ...Object.fromEntries(choices().map(({ field, default: name }) => [idOf(field), name])),
+});
 
 function command() {
   const { view, status } = state;
   const { pose } = view;
+  const usual = defaults();
   const words = status.command.split(" ");
   const kept = words.find((word) => word.startsWith("--aov="))?.slice(6).split(",") ?? [];
   const values = {
-    ...Object.fromEntries(Object.keys(DEFAULTS).map((name) => [name, view[name.replaceAll("-", "_")] ?? null])),
+    ...Object.fromEntries(Object.keys(usual).map((name) => [name, view[name.replaceAll("-", "_")] ?? null])),
     "look-at": pose && [pose.eye, pose.target, pose.up].map((point) => point.join(",")).join(":"),
     aov: [...new Set([...kept, view.shown].filter(Boolean))].join(","),
     stats: view.statistics,
   };
-  const flags = Object.entries(values).filter(([name, value]) => value !== DEFAULTS[name]);
-  const base = words.filter((word) => !Object.keys(DEFAULTS).some((name) => word.startsWith(`--${name}=`)));
+  const flags = Object.entries(values).filter(([name, value]) => value !== usual[name]);
+  const base = words.filter((word) => !Object.keys(usual).some((name) => word.startsWith(`--${name}=`)));
   return [...base, ...flags.map(([name, value]) => (value === true ? `--${name}` : `--${name}=${value}`))].join(" ");
 }
 
 /** What of the view decides how fast it converges and is not as usual, in words. */
 export function unusual() {
   const { view } = state;
-  const named = ["integrator", "light_sampling", "mis", "light_choice", "env_sampling", "sampler"].filter((field) => view[field] !== DEFAULTS[field.replaceAll("_", "-")]);
-  const words = named.map((field) => view[field]);
+  const named = choices().filter(({ field, default: name }) => field !== "tonemap" && view[field] !== name);
+  const words = named.map(({ field }) => view[field]);
   if (view.max_bounces !== null) words.push(`${view.max_bounces} bounces`);
   if (view.camera !== 0 || view.pose) words.push("another view");
   if (view.shown) words.push("AOVs");

@@ -78,7 +78,7 @@ impl Counts {
                 .map(|p| p.triangles.len())
                 .sum(),
             materials_by_bsdf,
-            image_bytes: scene.images.iter().map(image_bytes).sum(),
+            image_bytes: scene.images.iter().map(|image| image_bytes(image)).sum(),
         }
     }
 }

@@ -15,7 +15,8 @@ use sunfleck::film::output::ImageFormat;
 use sunfleck::film::png::{tone_map_srgb8, write_png};
 use sunfleck::film::tev_feed::{TevFeed, TevNews};
 use sunfleck::render::{RenderResult, Settings, StopReason, choose_camera, open_device, render_on};
-use sunfleck::scene::{Environment, Scene, load};
+use sunfleck::scene::load::{self, Decoded};
+use sunfleck::scene::{Environment, Scene};
 
 use super::estimator_args::EnvironmentArgs;
 use super::progress::Progress;
@@ -87,8 +88,18 @@ fn finish(job: &RenderJob, scene: &Scene, mut result: RenderResult) -> anyhow::R
 
 /// The scene with the environment that the flags ask for, with a camera and with light.
 pub(super) fn load_scene(name: &str, environment: &EnvironmentArgs, quiet: bool) -> anyhow::Result<Scene> {
-    let mut scene = load::resolve(name).map_err(Error::from)?;
-    change_environment(&mut scene, environment)?;
+    load_scene_again(name, environment, quiet, &Decoded::default())
+}
+
+/// The same with the images of earlier calls.
+pub(super) fn load_scene_again(
+    name: &str,
+    environment: &EnvironmentArgs,
+    quiet: bool,
+    decoded: &Decoded,
+) -> anyhow::Result<Scene> {
+    let mut scene = load::resolve_again(name, decoded).map_err(Error::from)?;
+    change_environment(&mut scene, environment, decoded)?;
     scene.frame_if_no_camera();
     print_warnings(&scene.warnings);
     if !quiet {
@@ -97,9 +108,10 @@ pub(super) fn load_scene(name: &str, environment: &EnvironmentArgs, quiet: bool)
     Ok(scene)
 }
 
-fn change_environment(scene: &mut Scene, change: &EnvironmentArgs) -> anyhow::Result<()> {
+fn change_environment(scene: &mut Scene, change: &EnvironmentArgs, decoded: &Decoded) -> anyhow::Result<()> {
     if let Some(file) = &change.file {
-        scene.environment = load::load_environment(file, change.strength, change.rotation_degrees)
+        scene.environment = decoded
+            .environment(file, change.strength, change.rotation_degrees)
             .map_err(Error::from)
             .context("--env")?;
         scene.light_if_dark();

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use sunfleck::film::aov::Aov;
 use sunfleck::render::{Settings, choose_camera};
+use sunfleck::scene::load::Decoded;
 use sunfleck::watch::messages::{Estimator, Pose, View};
 use sunfleck::watch::session::{self, Options, Serving};
 use sunfleck::watch::worker;
@@ -14,7 +15,7 @@ use sunfleck::{Error, Result};
 
 use super::estimator_args::EstimatorArgs;
 use super::parse;
-use super::render::load_scene;
+use super::render::{load_scene, load_scene_again};
 use super::tone_args::ToneArgs;
 
 const EXAMPLES: &str = "\
@@ -85,7 +86,7 @@ pub(crate) struct WorkerArgs {
 impl WorkerArgs {
     fn words(&self) -> Vec<String> {
         let (width, height) = self.resolution;
-        let mut words = vec![format!("--resolution={width}x{height}")];
+        let mut words = vec![format!("--resolution={width}x{height}"), format!("--spp={}", self.spp)];
         if self.estimator.seed != 0 {
             words.push(format!("--seed={}", self.estimator.seed));
         }
@@ -127,7 +128,7 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
     let mut worker_arguments: Vec<OsString> = vec!["watch-worker".into()];
     worker_arguments.extend(worker);
     worker_arguments.extend(args.job.tev.iter().map(|address| format!("--tev={address}").into()));
-    worker_arguments.extend([format!("--spp={}", args.job.spp).into(), "--".into(), args.job.scene.clone().into()]);
+    worker_arguments.extend(["--".into(), args.job.scene.clone().into()]);
     let options = Options {
         scene: args.job.scene.clone(),
         environment: environment.file,
@@ -153,7 +154,9 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<()> {
 pub(crate) fn run_worker(args: &WorkerArgs) -> anyhow::Result<()> {
     let (settings, environment) = args.settings()?;
     let scene = args.scene.clone();
-    let load = move || load_scene(&scene, &environment, true).map_err(|error| format!("{error:#}"));
+    let load = move |decoded: &Decoded| {
+        load_scene_again(&scene, &environment, true, decoded).map_err(|error| format!("{error:#}"))
+    };
     match worker::run(settings, Box::new(load), args.tev.as_deref()) {
         // The server is gone.
         Err(Error::Interrupted) => Ok(()),

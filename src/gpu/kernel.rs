@@ -111,6 +111,8 @@ pub struct Kernel {
     pub(super) pipeline: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
     pub(super) sets: Vec<vk::DescriptorSet>,
+    /// What the shader, as specialised, declares; `None` is everything.
+    declared: Option<Vec<u32>>,
     set_layout: vk::DescriptorSetLayout,
     pool: vk::DescriptorPool,
     gpu: Arc<Gpu>,
@@ -121,7 +123,7 @@ impl Kernel {
     ///
     /// # Errors
     /// When the driver refuses the shader or memory runs out.
-    pub fn new<'a>(gpu: &Arc<Gpu>, description: &KernelDescription<'a>) -> GpuResult<Self> {
+    pub fn new(gpu: &Arc<Gpu>, description: &KernelDescription<'_>) -> GpuResult<Self> {
         // Owned from the start, so that an error on the way frees what was made (null handles are ignored by Vulkan).
         let mut kernel = Self {
             name: description.name.to_owned(),
@@ -129,6 +131,7 @@ impl Kernel {
             pipeline: vk::Pipeline::null(),
             layout: vk::PipelineLayout::null(),
             sets: Vec::new(),
+            declared: None,
             set_layout: vk::DescriptorSetLayout::null(),
             pool: vk::DescriptorPool::null(),
             gpu: gpu.clone(),
@@ -137,16 +140,25 @@ impl Kernel {
         constants.extend_from_slice(description.constants);
         let specialized = if description.driver_specializes { None } else { specialize(description.spirv, &constants) };
         let spirv = specialized.as_deref().unwrap_or(description.spirv);
-        let declared = declared_bindings(spirv);
-        let is_bound = |number: u32| declared.as_ref().is_none_or(|declared| declared.contains(&number));
-        let bound = |set: &&[(u32, BindingResource<'a>)]| -> Vec<_> {
-            set.iter().filter(|(number, _)| is_bound(*number)).copied().collect()
-        };
-        let sets: Vec<_> = description.sets.iter().map(bound).collect();
+        kernel.declared = declared_bindings(spirv);
+        let sets = kernel.declared_of(description.sets);
         kernel.create_layouts(description, &sets[0])?;
         kernel.create_pipeline(spirv, &constants)?;
         kernel.create_sets(&sets)?;
         Ok(kernel)
+    }
+
+    /// Binds other resources of the same types, as many sets as there were; none of them may be in use. After an error it is as it was.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn rebind(&mut self, sets: &[&[(u32, BindingResource<'_>)]]) -> GpuResult<()> {
+        self.create_sets(&self.declared_of(sets))
+    }
+
+    fn declared_of<'a>(&self, sets: &[&[(u32, BindingResource<'a>)]]) -> Vec<Vec<(u32, BindingResource<'a>)>> {
+        let is_bound = |number: u32| self.declared.as_ref().is_none_or(|declared| declared.contains(&number));
+        sets.iter().map(|set| set.iter().filter(|(number, _)| is_bound(*number)).copied().collect()).collect()
     }
 
     fn create_layouts(
@@ -228,16 +240,22 @@ impl Kernel {
             })
             .collect();
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(set_count).pool_sizes(&sizes);
-        // SAFETY: the device is alive; the pool is sized for exactly these sets.
+        // SAFETY: the device is alive; the pool is sized for exactly these sets; those of the old one, if any, are in no
+        // submitted work.
         unsafe {
-            self.pool = device
+            let pool = device
                 .create_descriptor_pool(&info, None)
                 .map_err(GpuError::call("vkCreateDescriptorPool", &self.name))?;
             let layouts = vec![self.set_layout; sets.len()];
-            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
-            self.sets = device
-                .allocate_descriptor_sets(&info)
-                .map_err(GpuError::call("vkAllocateDescriptorSets", &self.name))?;
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+            match device.allocate_descriptor_sets(&info) {
+                Ok(sets) => self.sets = sets,
+                Err(error) => {
+                    device.destroy_descriptor_pool(pool, None);
+                    return Err(GpuError::call("vkAllocateDescriptorSets", &self.name)(error));
+                }
+            }
+            device.destroy_descriptor_pool(std::mem::replace(&mut self.pool, pool), None);
         }
         for (set, resources) in self.sets.iter().zip(sets) {
             for (binding, resource) in resources {

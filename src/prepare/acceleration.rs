@@ -1,5 +1,7 @@
 //! Builds the trees of all meshes into one slot array, world first.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::attributes::MeshGeometry;
@@ -7,6 +9,7 @@ use super::bounds::{Bounds, DBounds};
 use super::bvh::{self, BvhQuality, Primitive, Slot, Tree};
 use super::geometry::{Geometry, SharedMesh};
 use super::instances::Matrices;
+use super::kept::Kept;
 use super::{COORDINATE_LIMIT, PrepareError, PreparedMesh};
 use crate::layout::{InstanceRecord, InstanceSlot, SLOT_INSTANCE, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Triangle};
 
@@ -49,16 +52,21 @@ impl Acceleration {
 }
 
 /// Builds all trees and notes the slots of emissive triangles in `geometry`. `camera` is in rebased space.
-pub(super) fn build(geometry: &mut Geometry, camera: DVec3, quality: BvhQuality) -> Result<Acceleration, PrepareError> {
-    let trees: Vec<Tree> =
-        geometry.shared.iter().map(|mesh| Tree::build(&mut primitives(&mesh.geometry), quality)).collect();
+pub(super) fn build(
+    geometry: &mut Geometry,
+    camera: DVec3,
+    quality: BvhQuality,
+    kept: &Kept,
+) -> Result<Acceleration, PrepareError> {
+    let trees: Vec<Arc<Tree>> =
+        geometry.shared.iter().map(|mesh| kept.tree(primitives(&mesh.geometry), quality)).collect();
     let mut acceleration = Acceleration::new();
     place_instances(&mut acceleration, geometry, &trees, camera)?;
 
     let mut primitives = primitives(&geometry.world);
     let first_instance = primitives.len() as u32;
     primitives.extend((first_instance..).zip(&acceleration.instance_bounds).map(|(i, b)| Primitive::new(i, b)));
-    let tree = Tree::build(&mut primitives, quality);
+    let tree = kept.tree(primitives, quality);
     acceleration.bounds = tree.bounds();
     append(&mut acceleration, &tree, &mut geometry.world)?;
     for (tree, mesh) in trees.iter().zip(&mut geometry.shared) {
@@ -78,7 +86,7 @@ fn primitives(mesh: &MeshGeometry) -> Vec<Primitive> {
 fn place_instances(
     acceleration: &mut Acceleration,
     geometry: &Geometry,
-    trees: &[Tree],
+    trees: &[Arc<Tree>],
     camera: DVec3,
 ) -> Result<(), PrepareError> {
     let mut all = Bounds::around(geometry.world.leaves.iter().flat_map(|leaf| leaf.slot.vertices)).to_f64();

@@ -64,7 +64,7 @@ impl MaterialTable {
     ///
     /// # Errors
     /// If there are more materials or texels than the layout can index.
-    pub(super) fn new(scene: &Scene, textures: &mut TextureTable) -> Result<Self, PrepareError> {
+    pub(super) fn new(scene: &Scene, textures: &mut TextureTable<'_>) -> Result<Self, PrepareError> {
         let mut table = Self { uses: vec![None; scene.materials.len()], ..Self::default() };
         let mut seen = vec![false; scene.meshes.len()];
         for instance in &scene.instances {
@@ -111,7 +111,7 @@ impl MaterialTable {
     }
 
     /// Adds what the materials need.
-    pub(super) fn add_features(&self, textures: &TextureTable, features: &mut Features) {
+    pub(super) fn add_features(&self, textures: &TextureTable<'_>, features: &mut Features) {
         features.mip = textures.headers.iter().any(|header| header.sampling & TEXTURE_MIPS != 0);
         for record in &self.records {
             features.bsdfs |= 1 << (record.kind_flags & MATERIAL_KIND_MASK);
@@ -131,7 +131,12 @@ impl MaterialTable {
         }
     }
 
-    fn add(&mut self, scene: &Scene, index: usize, textures: &mut TextureTable) -> Result<MaterialUse, PrepareError> {
+    fn add(
+        &mut self,
+        scene: &Scene,
+        index: usize,
+        textures: &mut TextureTable<'_>,
+    ) -> Result<MaterialUse, PrepareError> {
         let material = &scene.materials[index];
         let presence = Presence::of(scene, index);
         if presence == Presence::Absent {

@@ -15,6 +15,7 @@ mod features;
 mod geometry;
 mod ggx;
 mod instances;
+mod kept;
 pub mod light_bvh;
 pub mod light_cone;
 mod lights;
@@ -35,6 +36,7 @@ pub use bvh::BvhQuality;
 pub use camera::camera_constants;
 pub use environment::EnvironmentKind;
 pub use features::Features;
+pub use kept::{Kept, Reuse};
 pub use lights::{spot_falloff, spot_solid_angle};
 pub use textures::srgb_to_linear;
 
@@ -230,16 +232,24 @@ pub struct Statistics {
 /// # Errors
 /// If something in it is larger or further away than the layout can express.
 pub fn prepare(scene: &Scene, options: &PrepareOptions) -> Result<Prepared, PrepareError> {
+    prepare_again(scene, options, &Kept::default())
+}
+
+/// The same with what was kept of other calls: bit for bit what [`prepare`] makes.
+///
+/// # Errors
+/// Those of [`prepare`].
+pub fn prepare_again(scene: &Scene, options: &PrepareOptions, kept: &Kept) -> Result<Prepared, PrepareError> {
     let start = Instant::now();
-    let mut textures = TextureTable::new(options.mip);
+    let mut textures = TextureTable::new(options.mip, kept);
     let materials = MaterialTable::new(scene, &mut textures)?;
     let bvh_start = Instant::now();
     let mut geometry = geometry::gather(scene, options, &materials)?;
     let camera = options.camera - geometry.origin;
-    let mut acceleration = acceleration::build(&mut geometry, camera, options.bvh_quality)?;
+    let mut acceleration = acceleration::build(&mut geometry, camera, options.bvh_quality, kept)?;
     let bvh_seconds = bvh_start.elapsed().as_secs_f64();
     let sampling = if options.sample_environment { options.environment_sampling } else { EnvironmentSampling::Uniform };
-    let environment = environment::prepare(&scene.environment, sampling)?;
+    let environment = kept.environment(&scene.environment, sampling)?;
     let lights = lights::gather(scene, &geometry, &mut acceleration, &materials, &environment, options)?;
     let mut features = pack::features(&geometry, &acceleration, &materials, &textures, &environment, &lights);
     features.near_lamps = lights.kinds() & (1 << crate::layout::LIGHT_TRIANGLE) != 0 && near_lamps::any(scene);

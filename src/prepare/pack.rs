@@ -1,5 +1,7 @@
 //! Joins what the stages made into the arrays and constants of the layout.
 
+use std::sync::Arc;
+
 use bytemuck::Pod;
 
 use super::acceleration::Acceleration;
@@ -41,8 +43,8 @@ pub(super) fn pack_arrays(
     geometry: Geometry,
     acceleration: Acceleration,
     materials: &MaterialTable,
-    textures: TextureTable,
-    environment: PreparedEnvironment,
+    textures: TextureTable<'_>,
+    environment: Arc<PreparedEnvironment>,
     lights: &LightTable,
     features: &Features,
 ) -> ([Vec<Texel>; SCENE_ARRAYS], RenderConstants) {
@@ -87,7 +89,7 @@ pub(super) fn pack_arrays(
         ..RenderConstants::default()
     };
     let slots = acceleration.slots.into_flattened();
-    let mut arrays = [slots, attributes, tables, textures.texels, environment.array];
+    let mut arrays = [slots, attributes, tables, textures.texels, Arc::unwrap_or_clone(environment).array];
     // A buffer of no bytes is not allowed.
     for array in arrays.iter_mut().filter(|array| array.is_empty()) {
         array.push(Texel::default());
@@ -116,7 +118,7 @@ pub(super) fn features(
     geometry: &Geometry,
     acceleration: &Acceleration,
     materials: &MaterialTable,
-    textures: &TextureTable,
+    textures: &TextureTable<'_>,
     environment: &PreparedEnvironment,
     lights: &LightTable,
 ) -> Features {

@@ -1,9 +1,10 @@
 //! Textures as the shader reads them: headers in the tables, texels in one array, each image once.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::PrepareError;
-use super::mip::mip_chain;
+use super::kept::Kept;
 use crate::layout::{
     NONE, TEXTURE_16_BIT, TEXTURE_MIPS, TEXTURE_NEAREST, TEXTURE_SET_1, TEXTURE_SRGB, TEXTURE_TRANSFORMED,
     TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT, Texel, TextureHeader,
@@ -29,8 +30,8 @@ pub(super) enum Lookup {
 }
 
 /// The textures in use.
-#[derive(Debug, Default)]
-pub(super) struct TextureTable {
+#[derive(Debug)]
+pub(super) struct TextureTable<'a> {
     /// Headers by the index that materials hold.
     pub headers: Vec<TextureHeader>,
     /// The texel array, packed words.
@@ -42,15 +43,17 @@ pub(super) struct TextureTable {
     chains: HashMap<(usize, bool), u32>,
     /// Textures that read the same words in the same way are one.
     known: HashMap<Key, u32>,
+    kept: &'a Kept,
 }
 
 /// Image, sampling bits, and the bits of the transform.
 type Key = (usize, u32, [[u32; 3]; 2]);
 
-impl TextureTable {
+impl<'a> TextureTable<'a> {
     /// None yet.
-    pub(super) fn new(mip: bool) -> Self {
-        Self { mip, ..Self::default() }
+    pub(super) fn new(mip: bool, kept: &'a Kept) -> Self {
+        let (images, chains, known) = (HashMap::new(), HashMap::new(), HashMap::new());
+        Self { headers: Vec::new(), texels: Vec::new(), mip, images, chains, known, kept }
     }
 
     /// Index of the header for a texture of the scene in the given use; its image is stored at the first use.
@@ -108,12 +111,12 @@ impl TextureTable {
         Ok(first_word)
     }
 
-    fn store_chain(&mut self, index: usize, image: &Image, space: ColorSpace) -> Result<u32, PrepareError> {
+    fn store_chain(&mut self, index: usize, image: &Arc<Image>, space: ColorSpace) -> Result<u32, PrepareError> {
         let key = (index, space == ColorSpace::Srgb);
         if let Some(&word) = self.chains.get(&key) {
             return Ok(word);
         }
-        let levels = mip_chain(image, space);
+        let levels = self.kept.chain(image, space);
         let first_words = levels.iter().map(|level| self.append(pack_16_bit(level))).collect::<Result<Vec<_>, _>>()?;
         let list = self.append(super::pack_words(&first_words))?;
         self.chains.insert(key, list);

@@ -12,8 +12,9 @@ use crate::film::aov::Aov;
 use crate::gpu::{
     ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, TraceBackend, embedded, shader_compiler,
 };
-use crate::layout::SliceConstants;
-use crate::prepare::Prepared;
+use crate::layout::{RenderConstants, SliceConstants};
+use crate::prepare::{Prepared, camera_constants};
+use crate::scene::Camera;
 use crate::{Error, Result};
 
 /// How a [`super::PathTracer`] is bound, where the device's own choice is not wanted (tests try every form).
@@ -53,6 +54,15 @@ pub(super) fn effective_max_bounces(settings: &Settings) -> u32 {
     settings.max_bounces.unwrap_or(u32::MAX).min(needed)
 }
 
+/// The constants of a scene, a camera and settings; seed and samples come later.
+pub(super) fn scene_constants(prepared: &Prepared, camera: &Camera, settings: &Settings) -> RenderConstants {
+    let mut constants = prepared.constants;
+    camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
+    constants.max_bounces = effective_max_bounces(settings);
+    constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
+    constants
+}
+
 /// The kernel with what of the scene is to be compiled in; the key says so from then on.
 pub(super) fn baked_spirv(
     gpu: &Gpu,
@@ -76,6 +86,32 @@ pub(super) fn build_kernel(
     constants: &Buffer,
     slices: &[Slice],
 ) -> Result<Kernel> {
+    let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
+    let kernel = with_sets(key, buffers, constants, slices, |sets| {
+        Kernel::new(
+            gpu,
+            &KernelDescription {
+                name: "path_trace",
+                spirv,
+                workgroup_size,
+                constants: &key.specialization(),
+                driver_specializes: overrides.driver_specializes,
+                push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
+                sets,
+            },
+        )
+    });
+    Ok(kernel?)
+}
+
+/// Does something with what is bound: a set for each slice.
+pub(super) fn with_sets<T>(
+    key: &KernelKey,
+    buffers: &SceneBuffers,
+    constants: &Buffer,
+    slices: &[Slice],
+    work: impl FnOnce(&[&[(u32, BindingResource<'_>)]]) -> T,
+) -> T {
     let arrays = buffers.bindings();
     let array_binding = array_binding(buffers, key.array_form, &arrays);
     let sets: Vec<Vec<(u32, BindingResource<'_>)>> = slices
@@ -96,19 +132,7 @@ pub(super) fn build_kernel(
         })
         .collect();
     let sets: Vec<&[(u32, BindingResource<'_>)]> = sets.iter().map(Vec::as_slice).collect();
-    let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
-    Ok(Kernel::new(
-        gpu,
-        &KernelDescription {
-            name: "path_trace",
-            spirv,
-            workgroup_size,
-            constants: &key.specialization(),
-            driver_specializes: overrides.driver_specializes,
-            push_constant_bytes: u32::try_from(size_of::<SliceConstants>()).unwrap_or(0),
-            sets: &sets,
-        },
-    )?)
+    work(&sets)
 }
 
 /// What the shader loop has compiled, else the embedded variant, or one compiled from `--shaders`.

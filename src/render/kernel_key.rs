@@ -129,6 +129,8 @@ impl KernelKey {
             f.near_lamps,
             self.clamp_indirect,
             f.panes,
+            // MAY_LACK_ATTRIBUTES: of this scene it is known.
+            false,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {

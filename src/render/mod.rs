@@ -7,6 +7,7 @@ mod kernel_build;
 mod kernel_key;
 mod looks;
 mod open;
+mod other_scene;
 mod path_tracer;
 mod prints;
 mod progress;
@@ -27,6 +28,7 @@ pub use function_kernel::{FunctionCall, FunctionKernel};
 pub use kernel_build::BindingOverride;
 pub use kernel_key::KernelKey;
 pub use open::{OpenDevice, choose_trace, open_device};
+pub use other_scene::OtherScene;
 pub use path_tracer::PathTracer;
 pub use prints::Printed;
 pub use progress::ProgressUpdate;
@@ -41,7 +43,7 @@ pub use statistics::{Occupancy, RayCount, RayReport, SliceReport, Statistics, St
 
 use crate::film::metadata::{world_to_camera, world_to_ndc_orthographic, world_to_ndc_perspective};
 use crate::film::replicates::ReplicateSums;
-use crate::prepare::{self, PrepareOptions, Prepared};
+use crate::prepare::{self, Kept, PrepareOptions, Prepared};
 pub use crate::prepare::{BvhQuality, EnvironmentSampling, LightChoice};
 use crate::scene::{Camera, Projection, Scene};
 use crate::{Error, Result};
@@ -51,6 +53,14 @@ use crate::{Error, Result};
 /// # Errors
 /// [`Error::Prepare`] if the scene does not fit the layout.
 pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Prepared> {
+    prepare_scene_again(scene, camera, settings, &Kept::default())
+}
+
+/// The same with what was kept of other calls.
+///
+/// # Errors
+/// Those of [`prepare_scene`].
+pub fn prepare_scene_again(scene: &Scene, camera: &Camera, settings: &Settings, kept: &Kept) -> Result<Prepared> {
     let options = PrepareOptions {
         camera: camera.camera_to_world.translation,
         environment_sampling: settings.environment_sampling(),
@@ -59,7 +69,7 @@ pub fn prepare_scene(scene: &Scene, camera: &Camera, settings: &Settings) -> Res
         bvh_quality: settings.bvh_quality,
         ..PrepareOptions::default()
     };
-    Ok(prepare::prepare(scene, &options)?)
+    Ok(prepare::prepare_again(scene, &options, kept)?)
 }
 
 /// Renders a scene on the device that the settings ask for. `progress` is called after every slice and may stop the run.

@@ -9,7 +9,9 @@ use ash::vk::BufferUsageFlags as Usage;
 use glam::DVec3;
 
 use super::bake::BakeReport;
-use super::kernel_build::{BindingOverride, baked_spirv, build_kernel, check_aovs, effective_max_bounces};
+use super::kernel_build::{
+    BindingOverride, baked_spirv, build_kernel, check_aovs, effective_max_bounces, scene_constants,
+};
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
 use super::run::{Limits, SliceResults};
@@ -26,16 +28,16 @@ use crate::{Error, Result};
 
 /// A scene on a device, ready to be rendered.
 pub struct PathTracer {
-    key: KernelKey,
+    pub(super) key: KernelKey,
     pub(super) kernel: Kernel,
     pub(super) constants: RenderConstants,
     /// Where rebased space has its zero.
-    origin: DVec3,
+    pub(super) origin: DVec3,
     pub(super) constants_buffer: Buffer,
     pub(super) slices: Vec<Slice>,
-    buffers: Arc<SceneBuffers>,
+    pub(super) buffers: Arc<SceneBuffers>,
     overrides: BindingOverride,
-    bake: BakeReport,
+    pub(super) bake: BakeReport,
     /// Seconds that compiling and uploading took.
     pub compile_seconds: f64,
     /// See `compile_seconds`.
@@ -103,10 +105,7 @@ impl PathTracer {
         overrides: BindingOverride,
     ) -> Result<Self> {
         let gpu = &buffers.gpu;
-        let mut constants = prepared.constants;
-        camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
-        constants.max_bounces = effective_max_bounces(settings);
-        constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
+        let constants = scene_constants(prepared, camera, settings);
         let constants_buffer = Buffer::new(
             gpu,
             "render constants",

@@ -17,6 +17,8 @@ mod tangents;
 mod texture;
 mod validate;
 
+use std::sync::Arc;
+
 pub use camera::{Camera, Projection};
 pub use environment::Environment;
 pub use error::{SceneError, SceneResult};
@@ -39,8 +41,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Textures: an image and how it is sampled.
     pub textures: Vec<Texture>,
-    /// Decoded images; several textures may share one.
-    pub images: Vec<Image>,
+    /// Decoded images; several textures may share one, and so may scenes.
+    pub images: Vec<Arc<Image>>,
     /// Placed meshes (the node hierarchy, flattened to world transforms).
     pub instances: Vec<Instance>,
     /// Point, spot and directional lights in world space.

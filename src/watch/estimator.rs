@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::render::{EnvironmentSampling, Settings};
 
 /// The choice that is left to the rest of the settings.
-const AUTO: &str = "auto";
+pub(super) const AUTO: &str = "auto";
 
 /// The estimator that is shown: all but `max_bounces` are specialisation constants of the kernel.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

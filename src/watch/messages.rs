@@ -158,10 +158,12 @@ pub enum FromWorker {
     Built {
         /// Number of the edit.
         edit: u32,
-        /// Seconds that the driver and the scene's specialisation took.
-        seconds: f64,
+        /// Seconds that the driver and the scene's specialisation took; `None`: the kernel is the same.
+        seconds: Option<f64>,
         /// The kernel's key.
         kernel: String,
+        /// Of a scene that was loaded again: what was made anew, and what kept.
+        reused: Option<String>,
     },
     /// An edit cannot be shown.
     Failed {

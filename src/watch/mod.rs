@@ -13,6 +13,7 @@ pub mod guard;
 pub mod hub;
 pub mod includes;
 pub mod messages;
+mod options;
 mod report;
 pub mod scene_files;
 pub mod server;

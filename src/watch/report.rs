@@ -22,6 +22,8 @@ pub(super) struct Report {
     /// SPIR-V to what the device runs, in the worker.
     pub(super) build_ms: Option<f64>,
     pub(super) first_image_ms: Option<f64>,
+    /// Of a scene that was loaded again: what was made anew, and what kept.
+    pub(super) reused: Option<String>,
     pub(super) rays_per_second: Option<f64>,
     pub(super) spp: u32,
     pub(super) error: Option<f64>,
@@ -37,6 +39,8 @@ pub(super) struct Report {
     start: Option<u32>,
     #[serde(skip)]
     is_said: bool,
+    /// A later edit is shown, and this one was not measured to the end.
+    is_superseded: bool,
 }
 
 impl Report {
@@ -48,6 +52,7 @@ impl Report {
             compile_ms: None,
             build_ms: None,
             first_image_ms: None,
+            reused: None,
             rays_per_second: None,
             spp: 0,
             error: None,
@@ -57,6 +62,7 @@ impl Report {
             view: String::new(),
             start: None,
             is_said: false,
+            is_superseded: false,
         }
     }
 
@@ -86,29 +92,36 @@ impl Report {
         }
         self.is_measured && !std::mem::replace(&mut self.is_said, self.is_measured)
     }
+
+    /// A later edit is shown: `true` if this one has not had its line.
+    pub(super) fn supersede(&mut self) -> bool {
+        self.is_superseded |= !self.is_said;
+        !std::mem::replace(&mut self.is_said, true)
+    }
+
+    /// It cannot be shown, and why has been said.
+    pub(super) fn fail(&mut self) {
+        self.is_said = true;
+    }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:", self.what)?;
-        let ms = |f: &mut fmt::Formatter<'_>, name: &str, value: Option<f64>| match value {
-            Some(value) => write!(f, " {name} {value:.0} ms,"),
-            None => Ok(()),
-        };
-        ms(f, "compile", self.compile_ms)?;
-        ms(f, "build", self.build_ms)?;
-        ms(f, "first image", self.first_image_ms)?;
-        write!(f, " {:.2} Mrays/s", self.rays_per_second.unwrap_or(0.0) / 1e6)?;
-        if let Some(ratio) = self.speed_ratio {
-            write!(f, " (x{ratio:.2})")?;
-        }
-        if let Some(error) = self.error {
-            write!(f, ", error {:.2} % at {} spp", 100.0 * error, self.spp)?;
-        }
-        if let Some(ratio) = self.error_ratio {
-            write!(f, " (x{ratio:.2})")?;
-        }
-        Ok(())
+        let ms = |name: &str, value: Option<f64>| value.map(|value| format!("{name} {value:.0} ms"));
+        let ratio = |ratio: Option<f64>| ratio.map_or_else(String::new, |ratio| format!(" (x{ratio:.2})"));
+        let superseded = self.is_superseded.then(|| match self.spp {
+            0 => "superseded before its first image".to_owned(),
+            spp => format!("superseded at {spp} spp"),
+        });
+        let rate = self.rays_per_second.map(|rate| format!("{:.2} Mrays/s{}", rate / 1e6, ratio(self.speed_ratio)));
+        let error = self
+            .error
+            .map(|error| format!("error {:.2} % at {} spp{}", 100.0 * error, self.spp, ratio(self.error_ratio)));
+        let times =
+            [ms("compile", self.compile_ms), ms("build", self.build_ms), ms("first image", self.first_image_ms)];
+        let parts = self.reused.iter().cloned().chain(times.into_iter().flatten());
+        let parts: Vec<_> = parts.chain([superseded, rate, error].into_iter().flatten()).collect();
+        write!(f, "{}: {}", self.what, parts.join(", "))
     }
 }
 
@@ -152,6 +165,24 @@ mod tests {
         assert_eq!(
             report.to_string(),
             "a.glsl: first image 12 ms, 2.00 Mrays/s (x1.00), error 2.50 % at 256 spp (x0.50)"
+        );
+        assert!(!report.supersede(), "it has had its line");
+    }
+
+    #[test]
+    fn what_is_superseded_says_so_once_with_what_was_measured() {
+        let mut report = Report::new(1, "a.png".to_owned(), Instant::now());
+        report.reused = Some("1 of 2 images decoded, tree kept".to_owned());
+        let mut shown = report.clone();
+        assert!(report.supersede() && !report.supersede());
+        assert_eq!(report.to_string(), "a.png: 1 of 2 images decoded, tree kept, superseded before its first image");
+        assert!(!shown.observe(&frame(16, 0.1), "v", None));
+        shown.first_image_ms = Some(12.0);
+        assert!(shown.supersede());
+        assert_eq!(
+            shown.to_string(),
+            "a.png: 1 of 2 images decoded, tree kept, first image 12 ms, superseded at 16 spp, 2.00 Mrays/s, \
+             error 10.00 % at 16 spp"
         );
     }
 }

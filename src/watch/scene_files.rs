@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-/// The scene file and the buffers, images and material libraries that it names. What cannot be read names nothing: the
+/// The scene file and the buffers, images, environments and material libraries that it names. What cannot be read names nothing: the
 /// loader says what is wrong with it.
 pub fn files_of(scene: &Path) -> Vec<PathBuf> {
     let folder = scene.parent().unwrap_or(Path::new(""));
@@ -30,7 +30,9 @@ pub fn files_of(scene: &Path) -> Vec<PathBuf> {
 fn gltf_uris(json: &[u8], folder: &Path) -> Vec<PathBuf> {
     let Ok(root) = serde_json::from_slice::<Value>(json) else { return Vec::new() };
     let entries = ["buffers", "images"].iter().filter_map(|list| root[list].as_array()).flatten();
-    let uris = entries.filter_map(|entry| entry["uri"].as_str()).filter(|uri| !uri.starts_with("data:"));
+    let scenes = root["scenes"].as_array().into_iter().flatten();
+    let skies = scenes.filter_map(|scene| scene.pointer("/extras/sunfleck/environment/file")?.as_str());
+    let uris = entries.filter_map(|entry| entry["uri"].as_str()).chain(skies).filter(|uri| !uri.starts_with("data:"));
     uris.map(|uri| folder.join(&*percent_encoding::percent_decode_str(uri).decode_utf8_lossy())).collect()
 }
 
@@ -56,8 +58,8 @@ mod tests {
     fn a_scene_is_its_file_and_what_that_names() {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-        let gltf =
-            r#"{"buffers":[{"uri":"a%20b.bin"},{"uri":"data:x"}],"images":[{"uri":"t/c.png"},{"bufferView":0}]}"#;
+        let gltf = r#"{"buffers":[{"uri":"a%20b.bin"},{"uri":"data:x"}],"images":[{"uri":"t/c.png"},{"bufferView":0}],
+                "scenes":[{},{"extras":{"sunfleck":{"environment":{"file":"sky.exr"}}}}]}"#;
         write("s.gltf", gltf);
         write("s.obj", "v 0 0 0\nmtllib s.mtl\n");
         write("s.mtl", "newmtl a\nmap_Kd -s 1 1 1 d.png\nnorm n.png\n");
@@ -67,8 +69,8 @@ mod tests {
         glb.extend(gltf.as_bytes());
         std::fs::write(folder.path().join("s.glb"), glb).unwrap();
         for (scene, expected) in [
-            ("s.gltf", &["s.gltf", "a b.bin", "t/c.png"] as &[&str]),
-            ("s.glb", &["s.glb", "a b.bin", "t/c.png"]),
+            ("s.gltf", &["s.gltf", "a b.bin", "t/c.png", "sky.exr"] as &[&str]),
+            ("s.glb", &["s.glb", "a b.bin", "t/c.png", "sky.exr"]),
             ("s.obj", &["s.obj", "d.png", "n.png", "s.mtl"]),
             ("none.gltf", &["none.gltf"]),
         ] {

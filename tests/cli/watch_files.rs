@@ -85,14 +85,14 @@ fn a_saved_texture_or_scene_is_the_new_picture_in_the_viewer() {
     let [red, _, blue] = expect(&seen, "a picture", |mean| mean[0] > 0.0);
 
     paint(&texture, [255, 0, 0]);
-    watch.expect(&["floor.png:", "first image"]);
+    watch.expect(&["floor.png:", "1 of 2 images decoded", "tree kept", "kernel kept", "first image"]);
     let [floor_red, ..] = expect(&seen, "a red floor", |mean| mean[0] / mean[2] > 1.2 * red / blue);
 
     std::fs::write(&scene, "{").unwrap();
     watch.expect(&["cannot be shown", "scene.gltf"]);
     json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = serde_json::json!([0, 0, 0, 1]);
     std::fs::write(&scene, json.to_string()).unwrap();
-    watch.expect(&["first image"]);
+    watch.expect(&["scene.gltf:", "image kept", "tree kept", "first image"]);
     expect(&seen, "a black floor", |mean| mean[0] < 0.9 * floor_red);
 }
 
@@ -109,4 +109,24 @@ fn a_saved_environment_is_the_new_picture_in_the_viewer() {
     paint(&sky, [0, 0, 255]);
     watch.expect(&["sky.png:", "first image"]);
     expect(&seen, "a blue sky", |mean| mean[2] > blue && mean[0] < 0.5 * red);
+}
+
+#[test]
+fn a_reload_that_another_one_overtakes_has_its_line_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let texture = folder.path().join("floor.png");
+    let (scene, _) = scene_of_files(folder.path());
+    paint(&texture, [255; 3]);
+    // So many pixels that none comes to 64 samples between two saves.
+    let watch = Watch::of(&scene, &["--resolution", "256x256", "--spp", "64"]);
+    watch.expect(&[" on "]);
+    for red in 0..3 {
+        std::thread::sleep(Duration::from_millis(600));
+        paint(&texture, [red, 0, 0]);
+    }
+    watch.expect(&["start:", "superseded"]);
+    for _ in 0..2 {
+        watch.expect(&["floor.png:", "superseded"]);
+    }
+    watch.expect(&["floor.png:", "64 spp"]);
 }

@@ -92,6 +92,15 @@ try {
     });
   }
 
+  await step("the page offers what the program knows", async () => {
+    for (const flag of ["integrator", "light-sampling", "mis", "light-choice", "env-sampling", "sampler", "tonemap"]) {
+      const offered = await page.$$eval(`#${flag} option`, (options) => options.map((option) => option.text));
+      const refusal = spawnSync(sunfleck, ["render", `--${flag}=nonsense`]).stderr.toString();
+      const known = refusal.match(/possible values: ([^\]]*)\]/);
+      assert.deepEqual(offered, known?.[1].split(/,\s+/), `${flag}: ${refusal}`);
+    }
+    assert.match(await page.textContent("#command"), /^sunfleck render cornell --resolution=\d+x\d+ --spp=64 --shaders=\S+$/);
+  });
   await step("freeze A", async () => {
     await page.keyboard.press("f");
     await page.waitForFunction(() => !document.getElementById("compare").disabled);
@@ -118,8 +127,9 @@ try {
     const mended = await mean();
     assert(Math.abs(mended[0] / mended[2] - before[0] / before[2]) < 0.1, `as before: ${before} ${mended}`);
   });
-  // SUNFLECK_E2E_EDITS=20 measures as many edits: medians from the save to the error, and to the first new image.
-  const times = { error: [], image: [] };
+  // SUNFLECK_E2E_EDITS=20 measures as many edits: medians from the save to the error, to the first new image, and of the
+  // latter what is not the driver's build.
+  const times = { error: [], image: [], "image, of which not the driver's build": [] };
   for (let i = 0; i < Number(process.env.SUNFLECK_E2E_EDITS ?? 0); i++) {
     let start = performance.now();
     writeFileSync(leaf, `${original}\nfloat broken() { return undeclared_${i}; }\n`);
@@ -130,6 +140,8 @@ try {
     writeFileSync(leaf, original.replaceAll("p.color", `(p.color * ${fresh()})`));
     await page.waitForFunction((before) => document.body.dataset.edit !== before, before, { timeout: 60000 });
     times.image.push(performance.now() - start);
+    const build = await page.textContent("#edits tr:nth-child(2) td:nth-child(2)");
+    times["image, of which not the driver's build"].push(times.image.at(-1) - parseInt(build));
   }
   for (const [name, list] of Object.entries(times)) {
     if (list.length > 0) figures[`save to ${name}, median`] = Math.round(list.sort((a, b) => a - b)[list.length >> 1]);
@@ -174,6 +186,40 @@ try {
     await shot("heat");
     await page.keyboard.press("b");
   });
+  await step("fingers turn, pinch and move the camera", async () => {
+    const box = await page.locator("#picture").boundingBox();
+    const at = (x, y) => ({ x: box.x + x * box.width, y: box.y + y * box.height });
+    const touch = await page.context().newCDPSession(page);
+    const fingers = async (type, ...touchPoints) => {
+      await touch.send("Input.dispatchTouchEvent", { type, touchPoints: touchPoints.map((point, id) => ({ ...point, id })) });
+      await page.waitForTimeout(50);
+    };
+    const pose = async () => {
+      const [eye, target] = (await page.textContent("#command")).match(/--look-at=(\S+)/)[1].split(":").map((p) => p.split(",").map(Number));
+      return { eye, target, distance: Math.hypot(...eye.map((x, i) => x - target[i])) };
+    };
+    const start = await pose();
+    await fingers("touchStart", at(0.4, 0.5));
+    await fingers("touchMove", at(0.5, 0.5));
+    await fingers("touchEnd");
+    const turned = await pose();
+    assert.deepEqual(turned.target, start.target, "one finger turns about the target");
+    assert(Math.abs(turned.distance / start.distance - 1) < 1e-9 && turned.eye[0] !== start.eye[0], JSON.stringify([start, turned]));
+    await fingers("touchStart", at(0.4, 0.5), at(0.6, 0.5));
+    await fingers("touchMove", at(0.3, 0.5), at(0.7, 0.5));
+    await fingers("touchEnd");
+    const nearer = await pose();
+    assert(Math.abs(nearer.distance / turned.distance - 0.5) < 0.02, `twice as far apart, half the distance: ${turned.distance} ${nearer.distance}`);
+    assert(Math.hypot(...nearer.target.map((x, i) => x - turned.target[i])) < 1e-6, "what is in the middle stays there");
+    await fingers("touchStart", at(0.4, 0.5), at(0.6, 0.5));
+    await fingers("touchMove", at(0.4, 0.6), at(0.6, 0.6));
+    await fingers("touchEnd");
+    const moved = await pose();
+    assert(Math.abs(moved.distance / nearer.distance - 1) < 0.05 && moved.target[1] > nearer.target[1], "the picture goes with both fingers");
+    assert(await page.evaluate(() => document.getElementById("mark").hidden), "a finger that moved pins nothing");
+    await page.waitForTimeout(500);
+  });
+  await finished();
   await step("the page goes on while a kernel is built", async () => {
     await page.evaluate(() => {
       window.arrivals = [];

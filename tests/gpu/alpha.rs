@@ -178,12 +178,9 @@ fn a_lamp_that_is_partly_there_gives_its_share() {
 
 /// An image of one row, white, with the given alphas.
 fn add_alpha_texture(scene: &mut Scene, alphas: &[u8]) -> TextureBinding {
-    scene.images.push(Image {
-        name: String::from("alphas"),
-        width: alphas.len() as u32,
-        height: 1,
-        texels: Texels::Rgba8(alphas.iter().map(|a| [255, 255, 255, *a]).collect()),
-    });
+    let texels = Texels::Rgba8(alphas.iter().map(|a| [255, 255, 255, *a]).collect());
+    let image = Image { name: String::from("alphas"), width: alphas.len() as u32, height: 1, texels };
+    scene.images.push(image.into());
     let image = scene.images.len() - 1;
     scene.textures.push(Texture {
         image,

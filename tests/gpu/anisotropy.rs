@@ -56,7 +56,7 @@ fn metal(strength: f32, rotation_radians: f64) -> Material {
 fn textured(strength: f32, rotation_radians: f64, texel: [u16; 3]) -> Scene {
     let mut scene = plane(metal(strength, rotation_radians), 0.0);
     let texels = Texels::Rgba16(vec![[texel[0], texel[1], texel[2], 65535]]);
-    scene.images.push(Image { name: String::from("direction"), width: 1, height: 1, texels });
+    scene.images.push(Image { name: String::from("direction"), width: 1, height: 1, texels }.into());
     let wrap = Wrap::Repeat;
     scene.textures.push(Texture { image: 0, wrap_u: wrap, wrap_v: wrap, filter: Filter::Linear });
     scene.materials[0].anisotropy_texture = Some(TextureBinding::new(0));

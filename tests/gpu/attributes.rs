@@ -32,7 +32,7 @@ fn placed(primitive: Primitive, transforms: &[DMat3]) -> Scene {
     let mut scene =
         Scene { meshes: vec![Mesh { name: String::from("mesh"), primitives: vec![primitive] }], ..empty_scene() };
     let texels = Texels::Rgba16(vec![[6554, 13107, 65535, 32768]]);
-    scene.images.push(Image { name: String::from("texel"), width: 1, height: 1, texels });
+    scene.images.push(Image { name: String::from("texel"), width: 1, height: 1, texels }.into());
     let wrap = Wrap::Repeat;
     scene.textures.push(Texture { image: 0, wrap_u: wrap, wrap_v: wrap, filter: Filter::Nearest });
     scene.materials.push(Material {

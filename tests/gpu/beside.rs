@@ -7,7 +7,8 @@ use crate::common::gpu;
 use crate::common::scenes::scene;
 use sunfleck::film::aov::Aov;
 use sunfleck::gpu::DeviceKind;
-use sunfleck::render::{BindingOverride, OpenDevice, PathTracer, Settings, prepare_scene};
+use sunfleck::render::{BindingOverride, OpenDevice, OtherScene, PathTracer, Settings, prepare_scene};
+use sunfleck::scene::Scene;
 
 fn bits(tracer: &mut PathTracer) -> Vec<[u64; 3]> {
     let run = tracer.run(5, 0..8, None, &mut |_| ControlFlow::Continue(())).expect("the device works");
@@ -79,5 +80,31 @@ fn a_tracer_rebuilt_for_aovs_and_counters_has_them_and_without_again_the_same_im
         }
         assert!(bits(&mut tracer) == reference, "counted: {is_counted}");
     }
+    gpu::assert_no_validation_messages();
+}
+
+/// What a kernel in front makes of another scene that it is built for; `None` if it is not.
+fn taken(tracer: &mut PathTracer, scene: &Scene, settings: &Settings) -> Option<Vec<[u64; 3]>> {
+    let camera = &scene.cameras[0];
+    let prepared = prepare_scene(scene, camera, settings).expect("the scene fits");
+    let overrides = BindingOverride::default();
+    let other = OtherScene::upload(tracer.key(), tracer.buffers(), &prepared, camera, settings, overrides);
+    tracer.take_scene(other.expect("it is uploaded")?).expect("it is bound");
+    Some(bits(tracer))
+}
+
+#[test]
+fn a_tracer_takes_another_scene_that_needs_the_same_kernel_and_no_other() {
+    let (mut scene, settings) = (scene("instances"), gpu::settings(40, 30));
+    let mut tracer = gpu::path_tracer(&scene, &settings);
+    let before = bits(&mut tracer);
+    let instance = scene.instances.last_mut().expect("there are some");
+    instance.object_to_world.translation.y += 0.25;
+    let moved = taken(&mut tracer, &scene, &settings).expect("the code is the same");
+    assert!(moved == bits(&mut gpu::path_tracer(&scene, &settings)) && moved != before, "a moved instance");
+    scene.cameras[0].lens_radius = 0.1;
+    scene.cameras[0].focus_distance = 4.0;
+    assert!(taken(&mut tracer, &scene, &settings).is_none(), "a lens is other code");
+    assert!(bits(&mut tracer) == moved, "it is as it was");
     gpu::assert_no_validation_messages();
 }

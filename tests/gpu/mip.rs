@@ -67,7 +67,7 @@ fn noise_image(random: &mut Random, width: u32, height: u32) -> Image {
 
 /// A scene of textures alone, one a material: headers come in the order of materials. Those of even index are sRGB.
 fn texture_kernel(images: Vec<Image>, transforms: &[TextureTransform]) -> TestKernel {
-    let mut scene = Scene { images, ..empty_scene() };
+    let mut scene = Scene { images: images.into_iter().map(Into::into).collect(), ..empty_scene() };
     let positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let mut primitives = Vec::new();
     for (i, &transform) in transforms.iter().enumerate() {
@@ -334,7 +334,7 @@ fn what_is_seen_stays_sharp() {
     ];
     for (name, camera, primitives, image) in views {
         let mut scene = builder::scene(primitives, vec![unlit.clone(), glass.clone(), mirror.clone()], camera);
-        scene.images.push(smooth_image(image));
+        scene.images.push(smooth_image(image).into());
         scene.textures.push(texture(0));
         let [mip, plain] = with_and_without(&scene, SIDE, 64);
         let n = plain.len() as f64;
@@ -369,7 +369,7 @@ fn scattered_light_stays_the_same() {
     let camera = builder::camera(DVec3::new(0.0, 0.6, 3.0), DVec3::new(0.0, 0.5, -0.5), 0.6);
     let mut scene = builder::scene(primitives, vec![floor, wall, lamp], camera);
     let texels = Texels::Rgba8((0..256 * 256).map(squares).collect());
-    scene.images.push(Image { name: String::from("squares"), width: 256, height: 256, texels });
+    scene.images.push(Image { name: String::from("squares"), width: 256, height: 256, texels }.into());
     scene.textures.push(texture(0));
     let side = 32;
     let (seeds, spp) = if scenes::slow_driver() { (16, 64) } else { (24, 128) };

@@ -50,7 +50,7 @@ fn mapped_plane(material: Material, texels: Vec<[u16; 4]>, width: u32) -> Scene 
     view.projection = Projection::Orthographic { ymag: 0.9 };
     let mut scene = scene(vec![plane], vec![material], view);
     let height = texels.len() as u32 / width;
-    scene.images.push(Image { name: String::from("map"), width, height, texels: Texels::Rgba16(texels) });
+    scene.images.push(Image { name: String::from("map"), width, height, texels: Texels::Rgba16(texels) }.into());
     let wrap = Wrap::Repeat;
     scene.textures.push(Texture { image: 0, wrap_u: wrap, wrap_v: wrap, filter: Filter::Nearest });
     scene.materials[0].normal_texture = Some(TextureBinding::new(0));

@@ -50,7 +50,7 @@ fn images() -> Vec<Image> {
 
 /// One material a case, whose only texture it is: headers come in the order of materials.
 fn kernel(cases: &[Case]) -> TestKernel {
-    let mut scene = Scene { images: images(), ..empty_scene() };
+    let mut scene = Scene { images: images().into_iter().map(Into::into).collect(), ..empty_scene() };
     for (texture, case) in cases.iter().enumerate() {
         let [wrap_u, wrap_v] = case.wrap;
         scene.textures.push(Texture { image: case.image, wrap_u, wrap_v, filter: case.filter });

@@ -18,6 +18,7 @@ mod prepare_geometry;
 mod prepare_light_bvh;
 mod prepare_lights;
 mod prepare_support;
+mod reload;
 mod scene_assets;
 mod scene_attributes;
 mod scene_bad_input;

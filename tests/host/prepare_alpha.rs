@@ -16,7 +16,7 @@ fn prepared_with(mut material: Material, texels: Option<Texels>) -> Prepared {
             Texels::Rgba8(texels) => texels.len(),
             Texels::Rgba16(texels) => texels.len(),
         };
-        scene.images.push(Image { name: String::new(), width: width as u32, height: 1, texels });
+        scene.images.push(Image { name: String::new(), width: width as u32, height: 1, texels }.into());
         let (wrap_u, wrap_v) = (Wrap::Repeat, Wrap::Repeat);
         scene.textures.push(Texture { image: 0, wrap_u, wrap_v, filter: Filter::Linear });
         material.base_color_texture = Some(TextureBinding::new(0));

@@ -175,7 +175,7 @@ fn attributes_are_kept_only_where_used() {
     let untextured = prepared(&scene);
     assert_eq!(triangles(&untextured, 0)[0].record.kind, TRIANGLE_NORMALS);
     let texels = Texels::Rgba16(vec![[1, 2, 3, 4], [5, 6, 7, 8], [9, 10, 11, 12]]);
-    scene.images.push(Image { name: String::new(), width: 3, height: 1, texels });
+    scene.images.push(Image { name: String::new(), width: 3, height: 1, texels }.into());
     scene.textures.push(Texture {
         image: 0,
         wrap_u: Wrap::MirroredRepeat,

@@ -167,7 +167,7 @@ fn textured_lamp(texcoords: Vec<[f32; 2]>, wrap: Wrap) -> Scene {
     let mut texels = vec![[0, 0, 0, 255]; 64 * 64];
     texels[10 * 64 + 20] = [255; 4];
     let mut scene = scene_of(&[UNIT, UNIT], &[DAffine3::IDENTITY]);
-    scene.images.push(Image { name: "glow".into(), width: 64, height: 64, texels: Texels::Rgba8(texels) });
+    scene.images.push(Image { name: "glow".into(), width: 64, height: 64, texels: Texels::Rgba8(texels) }.into());
     scene.textures.push(Texture { image: 0, wrap_u: wrap, wrap_v: wrap, filter: Filter::Linear });
     scene.materials[0] = Material { emission_texture: Some(TextureBinding::new(0)), ..emitter([1.0; 3]) };
     scene.meshes[0].primitives[0].texcoords = Some(texcoords);
@@ -196,8 +196,8 @@ fn a_textured_triangle_is_a_light_where_its_texels_are_bright() {
 #[test]
 fn a_black_emission_texture_is_not_stored() {
     let mut scene = textured_lamp(vec![[0.0; 2]; 6], Wrap::Repeat);
-    let Texels::Rgba8(texels) = &mut scene.images[0].texels else { unreachable!() };
-    texels.fill([0, 0, 0, 255]);
+    let black = Texels::Rgba8(vec![[0, 0, 0, 255]; 64 * 64]);
+    scene.images[0] = Image { texels: black, ..(*scene.images[0]).clone() }.into();
     let prepared = prepared(&scene);
     assert!(!prepared.features.emission && !prepared.features.textures);
     assert_eq!(prepared.statistics.array_bytes[SceneArray::Texels as usize], 16);

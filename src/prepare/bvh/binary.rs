@@ -15,6 +15,14 @@ pub struct Primitive {
     max: Vec4,
 }
 
+/// Bit for bit: the index would not compare as a number.
+impl PartialEq for Primitive {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |primitive: &Self| [primitive.min, primitive.max].map(|v| v.to_array().map(f32::to_bits));
+        bits(self) == bits(other)
+    }
+}
+
 impl Primitive {
     /// A primitive by its number and its finite, non-empty box.
     pub fn new(index: u32, bounds: &Bounds) -> Self {

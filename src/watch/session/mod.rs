@@ -23,6 +23,7 @@ use super::diagnostic::Diagnostic;
 use super::guard::Guard;
 use super::hub::Hub;
 use super::messages::{FromPage, FromWorker, Ready, Stage, ToWorker, View};
+use super::options::choices;
 use super::report::Report;
 use super::server::{Server, serve};
 use super::supervisor::{Heard, Helper};
@@ -99,6 +100,8 @@ struct Session {
     compiler: Compiler,
     worker: Helper<ToWorker>,
     worker_number: u32,
+    /// The worker that has announced its scene.
+    ready_worker: u32,
     ready: Option<Ready>,
     stage: Stage,
     heard: Instant,
@@ -154,6 +157,7 @@ impl Session {
             compiler: Compiler::new(),
             worker,
             worker_number: 1,
+            ready_worker: 0,
             ready: None,
             stage: Stage::Load,
             heard: now,
@@ -232,6 +236,7 @@ impl Session {
             "reports": self.reports,
             "prints": self.prints,
             "has_debug_pixel": self.current.as_ref().is_some_and(|kernel| kernel.calls.has_pixel),
+            "choices": choices(),
             "command": self.options.command,
             "shaders": self.options.shaders,
         });

@@ -34,18 +34,22 @@ impl Session {
                 self.building = Some((edit, Instant::now()));
                 self.show_status();
             }
-            FromWorker::Built { edit, seconds, kernel } => {
+            FromWorker::Built { edit, seconds, kernel, reused } => {
                 self.building = None;
                 if let Some(ready) = &mut self.ready {
                     ready.kernel = kernel;
                 }
                 if let Some(report) = self.report(edit) {
-                    report.build_ms = Some(1e3 * seconds);
+                    report.build_ms = seconds.map(|seconds| 1e3 * seconds);
+                    report.reused = reused;
                 }
                 self.show_status();
             }
             FromWorker::Failed { edit, message } => {
                 self.building = None;
+                if let Some(report) = self.report(edit) {
+                    report.fail();
+                }
                 self.say(&format!("edit {edit} cannot be shown: {message}"));
                 self.notice = Some(message);
                 self.show_status();
@@ -81,7 +85,10 @@ impl Session {
         }
         self.ready = Some(ready);
         self.worker.tell(ToWorker::View(Box::new(self.view.clone())), Vec::new());
+        let is_new_worker = std::mem::replace(&mut self.ready_worker, self.worker_number) != self.worker_number;
         match &self.current {
+            // It has loaded the scene again.
+            Some(_) if !variant_changed && !is_new_worker => {}
             Some(kernel) if !variant_changed => {
                 let prints = !kernel.calls.prints.is_empty();
                 self.worker.tell(ToWorker::Kernel { edit: kernel.edit, prints }, kernel.spirv.to_vec());
@@ -102,6 +109,11 @@ impl Session {
         json["type"] = json!("frame");
         self.hub.set_frame(&json.to_string(), png);
         let Some(index) = self.reports.iter().rposition(|report| report.edit == frame.edit) else { return };
+        for index in 0..index {
+            if self.reports[index].supersede() {
+                self.say(&self.reports[index].to_string());
+            }
+        }
         let before = self.reports[..index].iter().rev().find(|report| report.is_measured).cloned();
         let shows_value = self.view.debug && self.current.as_ref().is_some_and(|kernel| kernel.calls.has_pixel);
         let View { camera, pose, estimator, shown, statistics, .. } = &self.view;

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 
 use super::Incoming;
-use super::loaded::{LoadScene, Loaded, camera_of};
+use super::loaded::{LoadScene, Loaded, Loader, camera_of};
+use crate::Result;
 use crate::gpu::Gpu;
-use crate::render::{BindingOverride, OpenDevice, PathTracer, SceneBuffers, Settings};
+use crate::render::{BindingOverride, KernelKey, OpenDevice, OtherScene, PathTracer, SceneBuffers, Settings};
 use crate::watch::messages::View;
-use crate::{Error, Result};
 
 /// What is to be built.
 #[derive(Clone)]
@@ -37,13 +37,25 @@ pub(super) struct Front {
 /// What came of an order; `Err` has the tracer back, which is as it was.
 pub(super) struct Outcome {
     pub(super) wanted: Wanted,
-    pub(super) built: Result<Front>,
+    pub(super) built: Result<Built>,
+    /// Of a scene that was loaded again, what of it was made anew.
+    pub(super) reused: Option<String>,
     /// The tracer behind, if nothing was built in it.
     pub(super) behind: Option<PathTracer>,
 }
 
+/// What takes the place of what is in front.
+pub(super) enum Built {
+    /// Another kernel.
+    Kernel(Box<Front>),
+    /// A scene for the kernel in front.
+    Scene(Arc<Loaded>, Box<OtherScene>),
+}
+
 struct Order {
     wanted: Wanted,
+    /// Of the kernel in front, if it is made from the shader that is wanted.
+    key: Option<KernelKey>,
     gpu: Arc<Gpu>,
     loaded: Arc<Loaded>,
     buffers: Arc<SceneBuffers>,
@@ -81,9 +93,9 @@ impl Builder {
         load: LoadScene,
         done: Sender<Incoming>,
     ) -> Result<(Self, Front)> {
-        let scene = load().map_err(Error::Usage)?;
-        let loaded = Arc::new(Loaded::new(scene, &wanted.settings, &wanted.view)?);
-        let front = new_front(&device, &device.gpu, loaded, wanted)?;
+        let loader = Loader::new(load);
+        let (loaded, _) = loader.load(&wanted.settings, &wanted.view)?;
+        let front = new_front(&device, &device.gpu, Arc::new(loaded), wanted)?;
         // Where a second device is refused, kernels are built on the first, and keep it busy if its driver does so.
         let second = device.for_building().unwrap_or_else(|_| Arc::clone(&device.gpu));
         let (orders, inbox) = channel::<Order>();
@@ -91,7 +103,7 @@ impl Builder {
         std::thread::spawn(move || {
             while let Ok(order) = inbox.recv() {
                 let open = OpenDevice { gpu: Arc::clone(&order.gpu), trace, reason: reason.clone() };
-                if done.send(Incoming::Built(Box::new(build(&open, order, &load)))).is_err() {
+                if done.send(Incoming::Built(Box::new(build(&open, order, &loader)))).is_err() {
                     return;
                 }
             }
@@ -115,7 +127,9 @@ impl Builder {
         let edit = wanted.edit;
         let (gpu, loaded) = (Arc::clone(&self.gpus[1]), Arc::clone(&front.loaded));
         let buffers = Arc::clone(front.tracer.buffers());
-        let order = Order { wanted, gpu, loaded, buffers, behind: self.behind.take() };
+        let is_same_shader = wanted.settings.kernel_spirv == front.settings.kernel_spirv;
+        let key = is_same_shader.then(|| *front.tracer.key());
+        let order = Order { wanted, key, gpu, loaded, buffers, behind: self.behind.take() };
         self.in_work = self.orders.send(order).is_ok().then_some(edit);
     }
 
@@ -123,14 +137,26 @@ impl Builder {
     pub(super) fn take(&mut self, outcome: Outcome, front: &mut Front) -> Result<()> {
         self.in_work = None;
         self.behind = outcome.behind;
-        let result = outcome.built.map(|built| {
-            let old = std::mem::replace(front, built);
-            // Of a scene that is no longer shown, nothing is kept.
-            self.behind = Arc::ptr_eq(&old.loaded, &front.loaded).then_some(old.tracer);
-            self.gpus.swap(0, 1);
-        });
+        let result = outcome.built.and_then(|built| self.change(built, outcome.wanted, front));
         self.go_on(front);
         result
+    }
+
+    fn change(&mut self, built: Built, wanted: Wanted, front: &mut Front) -> Result<()> {
+        // Of a scene that is no longer shown, nothing is kept.
+        match built {
+            Built::Kernel(built) => {
+                let old = std::mem::replace(front, *built);
+                self.behind = Arc::ptr_eq(&old.loaded, &front.loaded).then_some(old.tracer);
+                self.gpus.swap(0, 1);
+            }
+            Built::Scene(loaded, scene) => {
+                front.tracer.take_scene(*scene)?;
+                (front.loaded, front.settings, front.prints) = (loaded, wanted.settings, wanted.prints);
+                self.behind = None;
+            }
+        }
+        Ok(())
     }
 
     /// Why this device, and which driver.
@@ -150,26 +176,40 @@ fn new_front(device: &OpenDevice, gpu: &Arc<Gpu>, loaded: Arc<Loaded>, wanted: &
     Ok(Front { loaded, tracer, settings: wanted.settings.clone(), prints: wanted.prints })
 }
 
-fn build(device: &OpenDevice, order: Order, load: &LoadScene) -> Outcome {
-    let Order { wanted, gpu, loaded, buffers, behind } = order;
-    if wanted.reload {
-        let scene = load().map_err(Error::Usage);
-        let loaded = scene.and_then(|scene| Loaded::new(scene, &wanted.settings, &wanted.view)).map(Arc::new);
-        let built = loaded.and_then(|loaded| new_front(device, &gpu, loaded, &wanted));
-        return Outcome { wanted, built, behind };
+fn build(device: &OpenDevice, order: Order, loader: &Loader) -> Outcome {
+    if order.wanted.reload {
+        let (built, reused) = match reload(device, &order, loader) {
+            Ok((built, reused)) => (Ok(built), Some(reused)),
+            Err(error) => (Err(error), None),
+        };
+        return Outcome { wanted: order.wanted, built, reused, behind: order.behind };
     }
+    let Order { wanted, gpu, loaded, buffers, behind, .. } = order;
+    let reused = None;
     let camera = match camera_of(&loaded.scene, &wanted.view) {
         Ok(camera) => camera,
-        Err(error) => return Outcome { wanted, built: Err(error), behind },
+        Err(error) => return Outcome { wanted, built: Err(error), reused, behind },
     };
     let (settings, prints) = (wanted.settings.clone(), wanted.prints);
-    let front = |tracer| Front { loaded: Arc::clone(&loaded), tracer, settings, prints };
+    let front = |tracer| Built::Kernel(Box::new(Front { loaded: Arc::clone(&loaded), tracer, settings, prints }));
     let Some(mut tracer) = behind else {
         let tracer = PathTracer::beside(&buffers, &gpu, &loaded.prepared, &camera, &wanted.settings, BINDING);
-        return Outcome { built: tracer.map(front), wanted, behind: None };
+        return Outcome { built: tracer.map(front), wanted, reused, behind: None };
     };
     match tracer.rebuild(&loaded.prepared, &camera, &wanted.settings) {
-        Ok(()) => Outcome { wanted, built: Ok(front(tracer)), behind: None },
-        Err(error) => Outcome { wanted, built: Err(error), behind: Some(tracer) },
+        Ok(()) => Outcome { wanted, built: Ok(front(tracer)), reused, behind: None },
+        Err(error) => Outcome { wanted, built: Err(error), reused, behind: Some(tracer) },
+    }
+}
+
+/// The scene anew: for the kernel in front, if it takes the same, else with a kernel of its own.
+fn reload(device: &OpenDevice, order: &Order, loader: &Loader) -> Result<(Built, String)> {
+    let Order { wanted, key, buffers, .. } = order;
+    let (loaded, reused) = loader.load(&wanted.settings, &wanted.view)?;
+    let camera = camera_of(&loaded.scene, &wanted.view)?;
+    let upload = |key| OtherScene::upload(key, buffers, &loaded.prepared, &camera, &wanted.settings, BINDING);
+    match key.as_ref().map(upload).transpose()?.flatten() {
+        Some(scene) => Ok((Built::Scene(Arc::new(loaded), Box::new(scene)), format!("{reused}, kernel kept"))),
+        None => Ok((Built::Kernel(Box::new(new_front(device, &order.gpu, Arc::new(loaded), wanted)?)), reused)),
     }
 }

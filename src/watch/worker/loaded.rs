@@ -1,13 +1,14 @@
 //! A scene in the worker, and the camera that looks at it.
 
-use crate::prepare::Prepared;
-use crate::render::{Settings, prepare_scene};
+use crate::prepare::{Kept, Prepared, Reuse};
+use crate::render::{Settings, prepare_scene_again};
+use crate::scene::load::Decoded;
 use crate::scene::{Camera, Scene};
 use crate::watch::messages::{CameraEntry, Pose, View};
 use crate::{Error, Result};
 
-/// Reads the scene; called anew for each reload.
-pub type LoadScene = Box<dyn Fn() -> std::result::Result<Scene, String> + Send>;
+/// Reads the scene, with the images of earlier calls; called anew for each reload.
+pub type LoadScene = Box<dyn Fn(&Decoded) -> std::result::Result<Scene, String> + Send>;
 
 /// A scene and what is made of it for the device.
 pub(super) struct Loaded {
@@ -16,8 +17,8 @@ pub(super) struct Loaded {
 }
 
 impl Loaded {
-    pub(super) fn new(scene: Scene, settings: &Settings, view: &View) -> Result<Self> {
-        let prepared = prepare_scene(&scene, &camera_of(&scene, view)?, settings)?;
+    pub(super) fn new(scene: Scene, settings: &Settings, view: &View, kept: &Kept) -> Result<Self> {
+        let prepared = prepare_scene_again(&scene, &camera_of(&scene, view)?, settings, kept)?;
         Ok(Self { scene, prepared })
     }
 
@@ -26,6 +27,48 @@ impl Loaded {
         let entry = |camera: &Camera| CameraEntry { name: camera.name.clone(), pose: pose_of(camera, centre) };
         self.scene.cameras.iter().map(entry).collect()
     }
+}
+
+/// Loads the scene again and again, and makes nothing anew of what has not changed.
+pub(super) struct Loader {
+    load: LoadScene,
+    decoded: Decoded,
+    kept: Kept,
+}
+
+impl Loader {
+    pub(super) fn new(load: LoadScene) -> Self {
+        Self { load, decoded: Decoded::keeping(), kept: Kept::keeping() }
+    }
+
+    /// The scene as its files are now, and what of it was made anew.
+    pub(super) fn load(&self, settings: &Settings, view: &View) -> Result<(Loaded, String)> {
+        let scene = (self.load)(&self.decoded).map_err(Error::Usage);
+        let loaded = scene.and_then(|scene| Loaded::new(scene, settings, view, &self.kept));
+        if loaded.is_err() {
+            // What is kept still fits the scene that is shown.
+            self.decoded.count_anew();
+            self.kept.count_anew();
+        }
+        Ok((loaded?, said(self.decoded.sweep(), self.kept.sweep())))
+    }
+}
+
+/// For people: how many of the scene's parts were made anew, of how many.
+fn said(images: (u32, u32), Reuse { trees, environments, .. }: Reuse) -> String {
+    let said = |(made, all): (u32, u32), done: &str, one: &str, many: &str| match (made, all) {
+        (_, 0) => None,
+        (0, 1) => Some(format!("{one} kept")),
+        (0, _) => Some(format!("{many} kept")),
+        (_, 1) => Some(format!("{one} {done}")),
+        _ => Some(format!("{made} of {all} {many} {done}")),
+    };
+    let parts = [
+        said(images, "decoded", "image", "images"),
+        said(environments, "prepared", "environment", "environments"),
+        said(trees, "built", "tree", "trees"),
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
 /// The camera of a view; one that the scene does not have is its first.

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
-use self::builder::{Builder, Front, Outcome, Wanted};
+use self::builder::{Builder, Built, Front, Outcome, Wanted};
 pub use self::loaded::LoadScene;
 use self::loaded::camera_of;
 use self::shown::Shown;
@@ -251,14 +251,17 @@ impl Worker {
 
     fn built(&mut self, outcome: Outcome) -> Result<()> {
         let Wanted { edit, reload, view, .. } = outcome.wanted.clone();
+        let keeps_kernel = matches!(outcome.built, Ok(Built::Scene(..)));
+        let reused = outcome.reused.clone();
         let result = self.builder.take(outcome, &mut self.front);
         match result {
             Ok(()) => {
                 self.edit = edit;
                 self.camera = self.fitting_camera()?.unwrap_or(view.camera);
                 self.restart();
-                let (seconds, kernel) = (self.front.tracer.compile_seconds, self.front.tracer.key().to_string());
-                say(&FromWorker::Built { edit, seconds, kernel }, &[])?;
+                let seconds = (!keeps_kernel).then_some(self.front.tracer.compile_seconds);
+                let kernel = self.front.tracer.key().to_string();
+                say(&FromWorker::Built { edit, seconds, kernel, reused }, &[])?;
                 self.building()?;
                 if reload {
                     self.aim = self.key_in_front();

@@ -5,7 +5,6 @@
 use super::Loader;
 use super::buffer::file_of_uri;
 use super::json::Json;
-use crate::scene::load::load_environment;
 use crate::scene::{Environment, SceneResult};
 
 impl Loader<'_> {
@@ -31,7 +30,8 @@ impl Loader<'_> {
                 let rotation_degrees = place.number_or("rotation_degrees", 0.0)?;
                 let path = file_of_uri(&file)?
                     .ok_or_else(|| file.fail("an environment cannot be a data URI").hint("name a file"))?;
-                load_environment(&path, strength as f32, rotation_degrees)
+                self.decoded
+                    .environment(&path, strength as f32, rotation_degrees)
                     .map_err(|error| file.fail(error.to_string()))?
             }
             _ => return Err(place.fail("an environment needs either \"color\" or \"file\"")),

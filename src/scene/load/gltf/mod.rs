@@ -31,8 +31,8 @@ use std::path::Path;
 use self::buffer::Buffers;
 use self::json::{Document, Json};
 use self::texture::PendingImage;
-use super::file;
 use super::warnings::Warnings;
+use super::{Decoded, file};
 use crate::scene::{Scene, SceneResult};
 
 /// What a file may require. KHR_materials_variants only adds alternatives to a valid default.
@@ -79,10 +79,12 @@ struct Loader<'a> {
     /// glTF image to its place among the pending ones.
     images: HashMap<usize, usize>,
     pending_images: Vec<PendingImage>,
+    /// Images of earlier loads.
+    decoded: &'a Decoded,
 }
 
 /// Reads a glTF file.
-pub(super) fn load(path: &Path) -> SceneResult<Scene> {
+pub(super) fn load(path: &Path, decoded: &Decoded) -> SceneResult<Scene> {
     let bytes = file::read(path)?;
     let (json, binary) = if bytes.starts_with(glb::MAGIC) { glb::split(path, &bytes)? } else { (&bytes[..], None) };
     let document = Document::parse(path, json)?;
@@ -100,6 +102,7 @@ pub(super) fn load(path: &Path) -> SceneResult<Scene> {
         textures: HashMap::new(),
         images: HashMap::new(),
         pending_images: Vec::new(),
+        decoded,
     };
     loader.load_nodes()?;
     loader.finish()
@@ -108,7 +111,7 @@ pub(super) fn load(path: &Path) -> SceneResult<Scene> {
 impl Loader<'_> {
     /// Decodes the images that are needed and closes the list of warnings.
     fn finish(mut self) -> SceneResult<Scene> {
-        self.scene.images = texture::decode(std::mem::take(&mut self.pending_images))?;
+        self.scene.images = texture::decode(std::mem::take(&mut self.pending_images), self.decoded)?;
         self.warn_of_the_whole()?;
         self.scene.warnings = self.warnings.into_lines();
         Ok(self.scene)

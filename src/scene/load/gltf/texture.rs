@@ -1,11 +1,13 @@
 //! Textures, samplers and images. Images are collected while materials are read and decoded at the end, in parallel.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::Loader;
 use super::buffer::{View, file_of_uri, read_uri};
 use super::json::Json;
-use crate::scene::load::image::decode_texture;
+use crate::scene::load::Decoded;
 use crate::scene::{Filter, Image, SceneError, SceneResult, Texture, Wrap};
 
 /// An image that some material needs, still encoded.
@@ -67,19 +69,19 @@ impl Loader<'_> {
 }
 
 /// Decodes all images, in order. Of several broken ones the first is reported.
-pub(super) fn decode(pending: Vec<PendingImage>) -> SceneResult<Vec<Image>> {
-    let decoded: Vec<SceneResult<Image>> = pending.into_par_iter().map(decode_one).collect();
-    decoded.into_iter().collect()
+pub(super) fn decode(pending: Vec<PendingImage>, decoded: &Decoded) -> SceneResult<Vec<Arc<Image>>> {
+    let images: Vec<_> = pending.into_par_iter().map(|pending| decode_one(pending, decoded)).collect();
+    images.into_iter().collect()
 }
 
-fn decode_one(pending: PendingImage) -> SceneResult<Image> {
+fn decode_one(pending: PendingImage, decoded: &Decoded) -> SceneResult<Arc<Image>> {
     let PendingImage { name, encoded, pointer, path } = pending;
     let fail = |message: String| {
         let subject = if name.is_empty() { String::from("the image") } else { format!("the image {name}") };
         SceneError::at(&path, &pointer, format!("{subject}: {message}"))
     };
     let hint = "replace it by a whole PNG, JPEG or WebP file";
-    let decode = |bytes: &[u8]| decode_texture(&name, bytes).map_err(|message| fail(message).hint(hint));
+    let decode = |bytes: &[u8]| decoded.texture(&name, bytes).map_err(|message| fail(message).hint(hint));
     match encoded {
         Encoded::Bytes(bytes) => decode(&bytes),
         Encoded::View(view) => decode(view.bytes()),

@@ -69,5 +69,5 @@ fn place(size: [usize; 2], data_size: [usize; 2], corner: [i64; 2], channels: [&
             }
         }
     }
-    Radiance { width: size[0] as u32, height: size[1] as u32, texels }
+    Radiance { width: size[0] as u32, height: size[1] as u32, texels: texels.into() }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use ::image::{DynamicImage, ImageFormat, ImageReader, Limits};
 
-use super::file;
+use super::{Decoded, file};
 use crate::scene::{Environment, Image, SceneError, SceneResult, Texels};
 
 /// More texels than this are refused: 2²⁹ are a 32768×16384 map, and 6 GiB as radiance.
@@ -69,10 +69,11 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
 }
 
 /// Linear radiance, row by row from the top.
-struct Radiance {
+#[derive(Debug)]
+pub(super) struct Radiance {
     width: u32,
     height: u32,
-    texels: Vec<[f32; 3]>,
+    texels: Arc<Vec<[f32; 3]>>,
 }
 
 /// Reads a latitude/longitude environment map.
@@ -85,6 +86,15 @@ struct Radiance {
 /// The file is missing or broken, is of another kind (a cube map, deep data), or holds a texel that is negative, NaN or
 /// infinite; `strength` is negative or either number is not finite.
 pub fn load_environment(path: &Path, strength: f32, rotation_degrees: f64) -> SceneResult<Environment> {
+    Decoded::default().environment(path, strength, rotation_degrees)
+}
+
+pub(super) fn read_environment(
+    path: &Path,
+    strength: f32,
+    rotation_degrees: f64,
+    decode: impl FnOnce(Vec<u8>) -> Result<Arc<Radiance>, String>,
+) -> SceneResult<Environment> {
     if !(strength >= 0.0 && strength.is_finite()) {
         let message = format!("an environment's strength must be a finite number of at least 0, not {strength}");
         return Err(SceneError::file(path, message));
@@ -95,19 +105,19 @@ pub fn load_environment(path: &Path, strength: f32, rotation_degrees: f64) -> Sc
     let bytes = file::read(path)?;
     let fail =
         |message: String| SceneError::file(path, message).hint("give a whole .hdr or .exr file, or a PNG or JPEG");
-    let radiance = decode_radiance(&bytes).map_err(fail)?;
+    let radiance = decode(bytes).map_err(fail)?;
     check_texels(path, &radiance, strength)?;
     Ok(Environment::Image {
         name: path.display().to_string(),
         width: radiance.width,
         height: radiance.height,
-        texels: Arc::new(radiance.texels),
+        texels: Arc::clone(&radiance.texels),
         strength,
         rotation_radians: rotation_degrees.to_radians(),
     })
 }
 
-fn decode_radiance(bytes: &[u8]) -> Result<Radiance, String> {
+pub(super) fn decode_radiance(bytes: &[u8]) -> Result<Radiance, String> {
     const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
     if bytes.starts_with(&EXR_MAGIC) {
         return exr::decode(bytes);
@@ -119,7 +129,7 @@ fn decode_radiance(bytes: &[u8]) -> Result<Radiance, String> {
         DynamicImage::ImageRgb32F(image) => image.pixels().map(|pixel| pixel.0).collect(),
         encoded => encoded.into_rgb16().pixels().map(|p| p.0.map(|c| srgb_to_linear(f64::from(c) / 65535.0))).collect(),
     };
-    Ok(Radiance { width, height, texels })
+    Ok(Radiance { width, height, texels: Arc::new(texels) })
 }
 
 /// IEC 61966-2-1: an encoded value in [0, 1] to a linear one.
@@ -167,11 +177,15 @@ mod tests {
 
     #[test]
     fn the_first_bad_texel_is_named() {
-        let mut radiance = Radiance { width: 3, height: 2, texels: vec![[1.0; 3]; 6] };
-        assert!(check_texels(Path::new("map.exr"), &radiance, 1.0).is_ok());
-        radiance.texels[4] = [0.0, f32::NAN, 0.0];
-        radiance.texels[5] = [-1.0, 0.0, 0.0];
-        let error = check_texels(Path::new("map.exr"), &radiance, 1.0).expect_err("NaN is refused").to_string();
+        let check = |texels: &[[f32; 3]]| {
+            let radiance = Radiance { width: 3, height: 2, texels: Arc::new(texels.to_vec()) };
+            check_texels(Path::new("map.exr"), &radiance, 1.0)
+        };
+        let mut texels = [[1.0; 3]; 6];
+        assert!(check(&texels).is_ok());
+        texels[4] = [0.0, f32::NAN, 0.0];
+        texels[5] = [-1.0, 0.0, 0.0];
+        let error = check(&texels).expect_err("NaN is refused").to_string();
         assert!(error.contains("texel (1, 1)") && error.contains("2 texels"), "{error}");
     }
 }

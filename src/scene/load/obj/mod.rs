@@ -25,12 +25,12 @@ use rayon::prelude::*;
 use self::material::MtlMaterial;
 use self::parse::{Corner, Face, Geometry};
 use self::textures::Textures;
-use super::file;
 use super::warnings::{NO_DIRECTION, Warnings};
+use super::{Decoded, file};
 use crate::scene::{Instance, Material, Mesh, Primitive, Scene, SceneError, SceneResult};
 
 /// Reads an OBJ file and the material libraries it names.
-pub(super) fn load(path: &Path) -> SceneResult<Scene> {
+pub(super) fn load(path: &Path, decoded: &Decoded) -> SceneResult<Scene> {
     let text = decode_text(&file::read(path)?);
     let mut warnings = Warnings::default();
     let geometry = parse::parse(path, &text, &mut warnings)?;
@@ -63,7 +63,7 @@ pub(super) fn load(path: &Path) -> SceneResult<Scene> {
     }
     let (textures, pending) = textures.into_parts();
     scene.textures = textures;
-    let images: Vec<SceneResult<_>> = pending.par_iter().map(textures::decode).collect();
+    let images: Vec<SceneResult<_>> = pending.par_iter().map(|source| textures::decode(source, decoded)).collect();
     scene.images = images.into_iter().collect::<SceneResult<_>>()?;
     textures::drop_heights(&mut scene, &pending, &mut warnings);
     generate_tangents(&mut scene, &mut warnings);

@@ -2,10 +2,11 @@
 //! quantity; ours pack alpha beside colour, and roughness (G) with metalness (B).
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::material::MtlTexture;
 use super::{at_line, file};
-use crate::scene::load::image::decode_texture;
+use crate::scene::load::Decoded;
 use crate::scene::load::warnings::Warnings;
 use crate::scene::{Filter, Image, Scene, SceneResult, Texels, Texture, TextureBinding};
 
@@ -93,31 +94,32 @@ fn is_bluish(image: &Image) -> bool {
 }
 
 /// Reads or makes an image.
-pub(super) fn decode(source: &Source) -> SceneResult<Image> {
-    let map = |texture: &Option<MtlTexture>| texture.as_ref().map(read).transpose();
+pub(super) fn decode(source: &Source, decoded: &Decoded) -> SceneResult<Arc<Image>> {
+    let read = |texture: &MtlTexture| read(texture, decoded);
+    let map = |texture: &Option<MtlTexture>| texture.as_ref().map(&read).transpose();
     match source {
         Source::File(texture) | Source::Bump(texture) => read(texture),
         Source::ColorAlpha { color, alpha } => {
             let (color, alpha) = (map(color)?, read(alpha)?);
             // An image with an alpha channel has it there, any other is grey.
             let channel = if is_translucent(&alpha) { 3 } else { 0 };
-            let of_color = |channel| color.as_ref().map(|image| Channel { image, channel });
-            Ok(combine([of_color(0), of_color(1), of_color(2), Some(Channel { image: &alpha, channel })]))
+            let of_color = |channel| color.as_deref().map(|image| Channel { image, channel });
+            Ok(combine([of_color(0), of_color(1), of_color(2), Some(Channel { image: &alpha, channel })]).into())
         }
         Source::RoughnessMetallic { roughness, metallic } => {
             let (roughness, metallic) = (map(roughness)?, map(metallic)?);
             let red = |image| Channel { image, channel: 0 };
-            Ok(combine([None, roughness.as_ref().map(red), metallic.as_ref().map(red), None]))
+            Ok(combine([None, roughness.as_deref().map(red), metallic.as_deref().map(red), None]).into())
         }
     }
 }
 
-fn read(texture: &MtlTexture) -> SceneResult<Image> {
+fn read(texture: &MtlTexture, decoded: &Decoded) -> SceneResult<Arc<Image>> {
     let name = texture.file.display().to_string();
     let fail = |message: String| at_line(&texture.mtl_file, texture.line, format!("the image {name}: {message}"));
     let bytes = file::read(&texture.file)
         .map_err(|error| fail(error.message).hint("put the file there, or remove the line"))?;
-    decode_texture(&name, &bytes).map_err(|message| fail(message).hint("replace it by a whole PNG, JPEG or WebP file"))
+    decoded.texture(&name, &bytes).map_err(|message| fail(message).hint("replace it by a whole PNG, JPEG or WebP file"))
 }
 
 fn is_translucent(image: &Image) -> bool {
