@@ -141,9 +141,10 @@ bool sample_direct_light(inout LaneState lane, Surface surface, vec3 wo, Triangl
     LightReceiver receiver = light_receiver(surface, origin);
     if (HAS_LIGHT_BVH || HAS_NEAR_LAMPS) lane.receiver = receiver;
     LightSample light = sample_light(constants, receiver, bits.xyz, environment_bits);
-    if (max_component(light.radiance) <= 0.0) return false;
     bool through = bsdf_transmits(surface.bsdf) && dot(light.direction, surface.side_normal) < 0.0;
-    if (!through && dot(light.direction, surface.horizon) <= 0.0) return false;
+    bool below = !through && dot(light.direction, surface.horizon) <= 0.0;
+    // One branch for both: the radiance of a constant environment is a matter of uniforms alone (FOR_ANY_SCENE).
+    if (any(bvec2(below, max_component(light.radiance) <= 0.0))) return false;
     if (through) origin = scattered_origin(surface, true);
     Scattering scattering = surface_scattering(surface, wo, light.direction, through);
     float weight = 1.0;

@@ -23,7 +23,7 @@ struct Vertices {
 Vertices interpolate_vertices(RenderConstants constants, uint triangle, uint instance, vec2 barycentric) {
     Vertices result = Vertices(vec3(0.0), mat3(0.0), vec4(0.0), vec4(0.0), vec4(0.0), NO_FOOTPRINT, vec4(0.0), vec4(1.0));
     if (!HAS_NORMALS && !HAS_TEXTURES && !HAS_TANGENTS && !HAS_VERTEX_COLORS) return result;
-    if (MAY_LACK_ATTRIBUTES && constants.vertex_texels == 0u) return result;
+    if (FOR_ANY_SCENE && constants.vertex_texels == 0u) return result;
     uvec4 record = LOAD4(ATTRIBUTES, triangle);
     if ((record.w & TRIANGLE_ATTRIBUTES) == 0u) return result;
     vec3 weights = vec3(1.0 - barycentric.x - barycentric.y, barycentric);

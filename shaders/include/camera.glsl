@@ -14,10 +14,11 @@ struct CameraRay {
 CameraRay camera_ray(RenderConstants constants, uvec2 pixel, vec4 u) {
     vec2 film = (vec2(pixel) + u.xy) / vec2(constants.width, constants.height) * 2.0 - 1.0;
     vec3 offset = constants.camera_right * film.x - constants.camera_up * film.y;
-    if (HAS_ORTHOGRAPHIC && constants.projection == PROJECTION_ORTHOGRAPHIC)
+    if (HAS_ORTHOGRAPHIC && (!FOR_ANY_SCENE || constants.projection == PROJECTION_ORTHOGRAPHIC))
         return CameraRay(constants.camera_origin + offset, constants.camera_forward);
     vec3 direction = constants.camera_forward + offset;
-    if (!HAS_LENS || constants.lens_radius == 0.0) return CameraRay(constants.camera_origin, normalize(direction));
+    if (!HAS_LENS || (FOR_ANY_SCENE && constants.lens_radius == 0.0))
+        return CameraRay(constants.camera_origin, normalize(direction));
     // Thin lens: the ray through the pinhole meets the plane in focus where the ray from the lens point must (PBR §5.2.3).
     vec2 disk = sqrt(u.z) * cos_sin_turns(u.w) * constants.lens_radius;
     vec3 lens = normalize(constants.camera_right) * disk.x + normalize(constants.camera_up) * disk.y;

@@ -80,7 +80,7 @@ Light load_light(RenderConstants constants, uint index) {
 
 // A triangle's kind, by its number.
 uint load_triangle_kind(RenderConstants constants, uint number) {
-    if (!HAS_ATTRIBUTES || (MAY_LACK_ATTRIBUTES && constants.vertex_texels == 0u)) return LOAD1(ATTRIBUTES, number);
+    if (!HAS_ATTRIBUTES || (FOR_ANY_SCENE && constants.vertex_texels == 0u)) return LOAD1(ATTRIBUTES, number);
     return LOAD4(ATTRIBUTES, number).w;
 }
 

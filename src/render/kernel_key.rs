@@ -129,7 +129,7 @@ impl KernelKey {
             f.near_lamps,
             self.clamp_indirect,
             f.panes,
-            // MAY_LACK_ATTRIBUTES: of this scene it is known.
+            // FOR_ANY_SCENE: it is for this one.
             false,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);

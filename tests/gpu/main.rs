@@ -18,6 +18,8 @@ mod clamp_indirect;
 mod cornell;
 mod debug_shaders;
 mod determinism;
+#[cfg(target_os = "linux")]
+mod dispatches;
 mod environment_chi_square;
 mod error_estimate;
 mod furnace;
