@@ -60,7 +60,8 @@ int searches_per_shading() {
     bool is_dear = HAS_TEXTURES || HAS_LIGHT_BVH || environment_is_sampled_by_texels();
     if (TRACE_BACKEND == TRACE_RAY_QUERY) return 1;
     if (is_dear) return 8;
-    return 3;
+    if (SAMPLER == SAMPLER_INDEPENDENT) return 1;
+    return 2;
 }
 
 // Longest path; reported when it is met. Roulette ends paths long before.

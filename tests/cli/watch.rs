@@ -159,6 +159,25 @@ fn a_worker_that_hangs_or_dies_is_replaced_and_the_loop_goes_on() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_worker_that_ends_while_the_scene_is_broken_starts_once_it_is_mended() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.gltf");
+    let whole = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/textured.gltf")).unwrap();
+    std::fs::write(&scene, &whole).unwrap();
+    let watch = Watch::of(&scene, &["--spp", "64"]);
+    watch.expect(&["start:", "64 spp"]);
+    std::fs::write(&scene, &whole[..whole.len() / 2]).unwrap();
+    watch.expect(&["edit 1 cannot be shown", "scene.gltf"]);
+    signal(worker_of(watch.child.id()).expect("there is a worker"), "-KILL");
+    watch.expect(&["the worker", "signal: 9", "started again"]);
+    watch.expect(&["scene.gltf"]);
+    watch.expect(&["the worker starts once one of its files is saved"]);
+    std::fs::write(&scene, &whole).unwrap();
+    watch.expect(&["scene.gltf:", "first image", "64 spp"]);
+}
+
 /// The text with a part replaced that must be in it.
 #[cfg(target_os = "linux")]
 fn replaced(text: &str, part: &str, by: &str) -> String {

@@ -26,6 +26,9 @@ impl Session {
             self.edit += 1;
             self.list(Report::new(self.edit, name, saved));
             self.notice = None;
+            if self.waits_for_scene {
+                self.restart_worker()?;
+            }
             self.worker.tell(ToWorker::Scene { edit: self.edit }, Vec::new());
             self.track_scene()?;
             self.show_status();

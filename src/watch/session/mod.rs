@@ -108,6 +108,8 @@ struct Session {
     /// The edit whose kernel the worker builds, and since when.
     building: Option<(u32, Instant)>,
     ends: u32,
+    /// There is no worker until a file of the scene is saved.
+    waits_for_scene: bool,
     /// The kernel that the worker was told to use, and the last of which an image has come.
     current: Option<CompiledKernel>,
     good: Option<CompiledKernel>,
@@ -163,6 +165,7 @@ impl Session {
             heard: now,
             building: None,
             ends: 0,
+            waits_for_scene: false,
             current: None,
             good: None,
             edit: 0,

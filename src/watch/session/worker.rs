@@ -25,6 +25,10 @@ impl Session {
             if self.ready.is_none() && self.worker_number == 1 {
                 return Err(start_error(status.and_then(|s| s.code())));
             }
+            if self.ready_worker != self.worker_number && matches!(status.and_then(|s| s.code()), Some(2 | 3)) {
+                self.wait_for_scene();
+                return Ok(());
+            }
             let status = status.map_or_else(|| "without a status".to_owned(), |status| status.to_string());
             return self.replace_worker(&format!("has ended ({status})"));
         };
@@ -192,6 +196,11 @@ impl Session {
         }
         self.say(&message);
         self.notice = Some(message);
+        self.restart_worker()
+    }
+
+    pub(super) fn restart_worker(&mut self) -> Result<()> {
+        self.waits_for_scene = false;
         self.worker_number += 1;
         self.worker = start_worker(&self.options, self.worker_number, &self.events)?;
         self.stage = Stage::Load;
@@ -199,6 +208,16 @@ impl Session {
         self.heard = Instant::now();
         self.show_status();
         Ok(())
+    }
+
+    /// A worker that took the place of another found the scene broken, and has said why on standard error.
+    fn wait_for_scene(&mut self) {
+        let message = "the scene cannot be loaded (see above); the worker starts once one of its files is saved";
+        self.say(message);
+        self.notice = Some(message.replace("see above", "the terminal says why"));
+        self.waits_for_scene = true;
+        self.stage = Stage::Idle;
+        self.show_status();
     }
 }
 
