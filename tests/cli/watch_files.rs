@@ -118,7 +118,7 @@ fn a_reload_that_another_one_overtakes_has_its_line_too() {
     let (scene, _) = scene_of_files(folder.path());
     paint(&texture, [255; 3]);
     // So many pixels that none comes to 64 samples between two saves.
-    let watch = Watch::of(&scene, &["--resolution", "256x256", "--spp", "64"]);
+    let watch = Watch::of(&scene, &["--resolution", "1024x1024", "--spp", "64"]);
     watch.expect(&[" on "]);
     for red in 0..3 {
         std::thread::sleep(Duration::from_millis(600));
