@@ -405,17 +405,15 @@ void render_baked(inout LaneState lane) {
     while (true) {
         rounds += shading_rounds() + 4u;
         if (!next_ray(lane)) break;
-        lane.rays += 1u;
         Found found = find_nearest(constants, lane.ray);
-        if (COUNTS_VISITS) count_traced(path_ray_kind(lane));
+        count_ray_of(lane);
         bool goes_on = false;
         // Behind the one test, the triangle is loaded once for the hit and for shading.
         if (found.slot != NONE) goes_on = shade_surface(lane, found_hit(lane.ray, found));
         else leave_scene(lane);
         if (goes_on && lane.ray.any_hit) {
-            lane.rays += 1u;
             bool free = !trace_occluded(constants, lane.ray);
-            if (COUNTS_VISITS) count_traced(RAY_SHADOW);
+            count_ray_of(lane);
             goes_on = finish_shadow(lane, free);
         }
         follow_path(lane, goes_on);

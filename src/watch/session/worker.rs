@@ -212,9 +212,10 @@ impl Session {
 
     /// A worker that took the place of another found the scene broken, and has said why on standard error.
     fn wait_for_scene(&mut self) {
-        let message = "the scene cannot be loaded (see above); the worker starts once one of its files is saved";
+        let message =
+            "the scene cannot be loaded (the terminal says why); the worker starts once one of its files is saved";
         self.say(message);
-        self.notice = Some(message.replace("see above", "the terminal says why"));
+        self.notice = Some(message.to_owned());
         self.waits_for_scene = true;
         self.stage = Stage::Idle;
         self.show_status();
