@@ -47,10 +47,11 @@ async function received(buffer) {
   const about = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const bytes = new Uint8Array(buffer, 4 + length);
   if (about.type === "file") return download(about.name, bytes);
+  // Decoding may be overtaken by that of a later image.
+  const number = ++state.received;
   const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-  // Decoding may be overtaken.
-  const last = state.frame;
-  if (last && about.start < last.start && about.edit === last.edit) return bitmap.close();
+  if (number < state.drawn) return bitmap.close();
+  state.drawn = number;
   state.frame = about;
   picture.show(bitmap, about.moving ? state.resolution : [about.width, about.height]);
   plot.add(about, unusual());
@@ -60,6 +61,7 @@ async function received(buffer) {
   document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   document.body.dataset.edit = about.edit;
   document.body.dataset.start = about.start;
+  document.body.dataset.spp = about.spp;
   placeMark(picture);
   if (!about.moving) inspectPinned();
   flushView();

@@ -7,7 +7,11 @@ export const state = {
   status: null,
   view: null,
   resolution: [1, 1],
-  /** What the last image was like. */
+  /** Images that have come. */
+  received: 0,
+  /** Which of them is drawn. */
+  drawn: 0,
+  /** What it was like. */
   frame: null,
   /** The pixel that a click has pinned. */
   pinned: null,

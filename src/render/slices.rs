@@ -200,7 +200,9 @@ impl SliceSizes {
         if !self.fixed_atoms {
             let factor = (self.target.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
             let wanted = f64::from(outcome.constants.atoms) * factor;
-            self.atoms = (wanted as u32).clamp(FIRST_ATOMS.min(self.largest), self.largest);
+            // Whole workgroups, of whatever size they are: none runs with lanes that have nothing to do.
+            let whole = wanted as u32 / FIRST_ATOMS * FIRST_ATOMS;
+            self.atoms = whole.clamp(FIRST_ATOMS.min(self.largest), self.largest);
         }
         if !self.fixed_budget {
             // Most atoms end within a few times the mean; the rest go on in another dispatch.

@@ -69,7 +69,8 @@ try {
     for (let i = 0; i < data.length; i += 4) for (let c = 0; c < 3; c++) sum[c] += data[i + c];
     return sum.map((s) => (4 * s) / data.length);
   });
-  const finished = () => page.waitForFunction(() => document.getElementById("stage").textContent === "finished", null, { timeout: 120000 });
+  // The last image may still be decoded when the server says that it is done.
+  const finished = () => page.waitForFunction(() => document.getElementById("stage").textContent === "finished" && document.body.dataset.spp === "64", null, { timeout: 120000 });
   const edit = (n) => page.waitForFunction((n) => Number(document.body.dataset.edit) >= n, n, { timeout: 60000 });
   const frames = () => page.evaluate(() => Number(document.body.dataset.frames ?? 0));
 
