@@ -77,6 +77,10 @@ pub fn prepare_driver_environment(paths: Option<u64>) -> &'static DriverEnvironm
         }
         let chosen = choose(&Circumstances::of_this_process(paths));
         for (name, value) in &chosen.set {
+            if *name == CACHE_VARIABLE {
+                // Mesa makes a folder, but not those above it. Where this fails it says so, and keeps nothing.
+                let _ = std::fs::create_dir_all(value);
+            }
             // SAFETY: this is the process's only thread, as was just seen, so nobody reads the environment meanwhile.
             unsafe { std::env::set_var(name, value) };
         }

@@ -60,6 +60,7 @@ impl PathTracer {
         self.origin = other.origin;
         self.buffers = other.buffers;
         self.bake = other.bake;
+        self.forget_sizes();
         Ok(())
     }
 }

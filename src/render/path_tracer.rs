@@ -35,6 +35,7 @@ pub struct PathTracer {
     pub(super) origin: DVec3,
     pub(super) constants_buffer: Buffer,
     pub(super) slices: Vec<Slice>,
+    pub(super) sizes: SliceSizes,
     pub(super) buffers: Arc<SceneBuffers>,
     overrides: BindingOverride,
     pub(super) bake: BakeReport,
@@ -121,6 +122,7 @@ impl PathTracer {
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
+        let sizes = SliceSizes::new(overrides, slices[0].atoms());
         Ok(Self {
             key,
             kernel,
@@ -128,6 +130,7 @@ impl PathTracer {
             origin: prepared.origin,
             constants_buffer,
             slices,
+            sizes,
             buffers,
             overrides,
             bake,
@@ -168,10 +171,16 @@ impl PathTracer {
         if let Some(slices) = others {
             self.slices = slices;
         }
+        self.forget_sizes();
         self.constants.max_bounces = effective_max_bounces(settings);
         self.constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
         self.compile_seconds = start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// What slices of another kernel or scene have taken says nothing.
+    pub(super) fn forget_sizes(&mut self) {
+        self.sizes = SliceSizes::new(self.overrides, self.slices[0].atoms());
     }
 
     /// The key of the kernel that [`PathTracer::rebuild`] would build, but for what it would compile in.
@@ -219,7 +228,6 @@ impl PathTracer {
         }
         self.constants.seed = seed;
         let looks = Looks::new(plan.samples.clone(), plan.target_error);
-        let mut sizes = SliceSizes::new(self.overrides, self.slices[0].atoms());
         let mut run = Run::new(&self.constants, plan, &self.key);
         // An open end is no total.
         let mut expected = (plan.samples.end < u32::MAX).then(|| plan.samples.end - plan.samples.start);
@@ -228,7 +236,7 @@ impl PathTracer {
             self.constants.first_sample = done;
             self.constants.end_sample = end;
             let limits = Limits { start, time: plan.time, samples_total: expected.map(|n| self.total_samples(n)) };
-            self.run_range(&mut run, &mut sizes, &limits, progress)?;
+            self.run_range(&mut run, &limits, progress)?;
             if run.stopped_by != StopReason::Samples || plan.target_error.is_none() {
                 break;
             }
@@ -250,11 +258,11 @@ impl PathTracer {
     fn run_range(
         &mut self,
         run: &mut Run,
-        sizes: &mut SliceSizes,
         limits: &Limits,
         progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
     ) -> Result<()> {
         self.constants_buffer.write(&[self.constants])?;
+        self.sizes.begin(self.constants.end_sample - self.constants.first_sample);
         let mut schedule = Schedule::new(&self.constants);
         let mut in_flight = VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
@@ -265,7 +273,7 @@ impl PathTracer {
             }
             while run.stopped_by == StopReason::Samples && !schedule.is_done() {
                 let Some(slot) = free.pop() else { break };
-                let constants = schedule.next(sizes.next_atoms(), self.slices[slot].lanes(), sizes.ray_budget());
+                let constants = schedule.next(self.sizes.next_atoms(), self.slices[slot].lanes(), self.sizes.ray_budget());
                 self.slices[slot].submit(&self.kernel, slot, constants)?;
                 in_flight.push_back(slot);
             }
@@ -273,7 +281,7 @@ impl PathTracer {
             let Some(slot) = in_flight.pop_front() else { return Ok(()) };
             let outcome = self.slices[slot].finish(&self.kernel, slot, last_end)?;
             last_end = Instant::now();
-            sizes.observe(&outcome);
+            self.sizes.observe(&outcome);
             let (slice, atoms) = (&self.slices[slot], outcome.constants.atoms);
             let brought = SliceResults {
                 results: slice.results(atoms)?,

@@ -11,14 +11,16 @@ use super::kernel_build::BindingOverride;
 use super::kernel_key::KernelKey;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
-use crate::layout::{AovSums, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue};
+use crate::layout::{AovSums, BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue};
 
 /// Slices that are submitted before the oldest is read.
 pub(super) const SLICES_IN_FLIGHT: usize = 2;
 /// Time a slice should take.
 const TARGET: Duration = Duration::from_millis(75);
-/// Atoms of the first slice, and of the smallest.
-const FIRST_ATOMS: u32 = 256;
+/// Paths of a kernel's first slice.
+const FIRST_PATHS: u64 = 1 << 12;
+/// Atoms of the smallest slice.
+const FEWEST_ATOMS: u32 = 256;
 /// Most lanes of a slice on a CPU: its threads run workgroups one after the other, so the first take nearly all atoms. More
 /// would find none left, fewer would not reach all threads.
 const MOST_CPU_LANES: u32 = 1 << 13;
@@ -159,14 +161,17 @@ impl Slice {
     }
 }
 
-/// How large the next slice may be, from how long the last ones took.
+/// How large the next slice may be, from how long the last ones took, those of earlier runs of the kernel too.
 pub(super) struct SliceSizes {
-    atoms: u32,
+    /// Paths of the next slice.
+    paths: u64,
+    /// Paths of an atom in the run that goes on.
+    atom_paths: u32,
     largest: u32,
     ray_budget: u32,
     target: Duration,
-    fixed_atoms: bool,
-    fixed_budget: bool,
+    fixed_atoms: Option<u32>,
+    fixed_budget: Option<u32>,
 }
 
 impl SliceSizes {
@@ -175,19 +180,31 @@ impl SliceSizes {
         if kind == DeviceKind::Cpu { 1 << 15 } else { 1 << 19 }
     }
 
+    /// For a kernel that has not run.
     pub(super) fn new(overrides: BindingOverride, largest: u32) -> Self {
         Self {
-            atoms: overrides.slice_atoms.unwrap_or(FIRST_ATOMS).min(largest),
+            paths: FIRST_PATHS,
+            atom_paths: BLOCK_SAMPLES,
             largest,
             ray_budget: overrides.ray_budget.unwrap_or(1024),
             target: overrides.slice_time.unwrap_or(TARGET),
-            fixed_atoms: overrides.slice_atoms.is_some(),
-            fixed_budget: overrides.ray_budget.is_some(),
+            fixed_atoms: overrides.slice_atoms,
+            fixed_budget: overrides.ray_budget,
         }
     }
 
+    /// What is rendered next is so many samples of each pixel.
+    pub(super) fn begin(&mut self, samples: u32) {
+        self.atom_paths = samples.clamp(1, BLOCK_SAMPLES);
+    }
+
     pub(super) fn next_atoms(&self) -> u32 {
-        self.atoms
+        let atoms = self.fixed_atoms.unwrap_or_else(|| {
+            // Whole workgroups, of whatever size they are: none runs with lanes that have nothing to do.
+            let wanted = self.paths / u64::from(self.atom_paths) / u64::from(FEWEST_ATOMS) * u64::from(FEWEST_ATOMS);
+            u32::try_from(wanted).unwrap_or(u32::MAX).max(FEWEST_ATOMS)
+        });
+        atoms.min(self.largest)
     }
 
     pub(super) fn ray_budget(&self) -> u32 {
@@ -197,14 +214,11 @@ impl SliceSizes {
     /// Grows or shrinks towards the target. A slice waits for the one before it, so its time is at most twice its own.
     pub(super) fn observe(&mut self, outcome: &SliceOutcome) {
         let own = outcome.seconds / SLICES_IN_FLIGHT as f64;
-        if !self.fixed_atoms {
-            let factor = (self.target.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
-            let wanted = f64::from(outcome.constants.atoms) * factor;
-            // Whole workgroups, of whatever size they are: none runs with lanes that have nothing to do.
-            let whole = wanted as u32 / FIRST_ATOMS * FIRST_ATOMS;
-            self.atoms = whole.clamp(FIRST_ATOMS.min(self.largest), self.largest);
-        }
-        if !self.fixed_budget {
+        let factor = (self.target.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
+        let paths = u64::from(outcome.constants.atoms) * u64::from(self.atom_paths);
+        let most = u64::from(self.largest) * u64::from(self.atom_paths);
+        self.paths = ((paths as f64 * factor) as u64).min(most);
+        if self.fixed_budget.is_none() {
             // Most atoms end within a few times the mean; the rest go on in another dispatch.
             let mean = outcome.rays / u64::from(outcome.constants.atoms.max(1));
             self.ray_budget = u32::try_from(8 * mean).unwrap_or(u32::MAX).clamp(256, 1 << 16);

@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use notify::{EventKind, RecommendedWatcher, RecursiveMode, Watcher};
+use notify::event::{AccessKind, AccessMode, EventKind, ModifyKind, RenameMode};
+use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 
 use crate::{Error, Result};
 
-/// An editor writes in several steps; this long after the last one a file is taken to be whole.
+/// An editor writes in several steps; this long after the last one a file is taken to be whole,
 const QUIET: Duration = Duration::from_millis(15);
+/// and this long if that was to close it or to give it its name (Linux tells). Other files may have been saved with it.
+const QUIET_WHOLE: Duration = Duration::from_millis(3);
 /// Something that is written to all the time is looked at nevertheless.
 const LONGEST_WAIT: Duration = Duration::from_millis(150);
 
@@ -26,8 +29,9 @@ impl Tracker {
         let (send, events) = channel();
         let watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
             let Ok(event) = event else { return };
-            if !matches!(event.kind, EventKind::Access(_)) {
-                let _ = send.send(event.paths);
+            let is_whole = is_whole(event.kind);
+            if is_whole || !matches!(event.kind, EventKind::Access(_)) {
+                let _ = send.send((event.paths, is_whole));
             }
         });
         let watcher = watcher.map_err(|e| Error::Usage(format!("files cannot be watched: {e}")))?;
@@ -62,12 +66,23 @@ pub(super) fn absolute(path: &Path) -> PathBuf {
     }
 }
 
-fn burst(events: &Receiver<Vec<PathBuf>>) -> Option<BTreeSet<PathBuf>> {
-    let mut paths: BTreeSet<PathBuf> = events.recv().ok()?.into_iter().collect();
+/// Whether the writing of a file ended with this.
+fn is_whole(kind: EventKind) -> bool {
+    let closed = EventKind::Access(AccessKind::Close(AccessMode::Write));
+    let renamed = |mode| EventKind::Modify(ModifyKind::Name(mode));
+    kind == closed || kind == renamed(RenameMode::To) || kind == renamed(RenameMode::Both)
+}
+
+fn burst(events: &Receiver<(Vec<PathBuf>, bool)>) -> Option<BTreeSet<PathBuf>> {
+    let (first, mut is_whole) = events.recv().ok()?;
+    let mut paths: BTreeSet<PathBuf> = first.into_iter().collect();
     let start = Instant::now();
     while start.elapsed() < LONGEST_WAIT {
-        match events.recv_timeout(QUIET) {
-            Ok(more) => paths.extend(more),
+        match events.recv_timeout(if is_whole { QUIET_WHOLE } else { QUIET }) {
+            Ok((more, whole)) => {
+                paths.extend(more);
+                is_whole = whole;
+            }
             Err(RecvTimeoutError::Timeout) => break,
             Err(RecvTimeoutError::Disconnected) => return None,
         }

@@ -80,7 +80,7 @@ pub(super) const BINDING: BindingOverride = BindingOverride {
     array_form: None,
     workgroup_size: None,
     slice_atoms: None,
-    slice_time: Some(std::time::Duration::from_millis(20)),
+    slice_time: Some(std::time::Duration::from_millis(10)),
     ray_budget: None,
     driver_specializes: false,
 };

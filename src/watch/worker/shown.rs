@@ -16,8 +16,13 @@ use crate::{Error, Result};
 
 /// Images are sent this often while samples come in.
 const FRAME_INTERVAL: Duration = Duration::from_millis(120);
-/// A round of samples between two images should take about this long.
+/// A round of samples between two images should take about this long at first,
 const ROUND: Duration = Duration::from_millis(100);
+/// and later this share of the time that the picture has taken: one sample a pixel is rendered more slowly than several, and
+/// more of them change less. What interrupts a round does not wait for its end.
+const ROUND_SHARE: f64 = 0.25;
+/// But never longer than this.
+const LONGEST_ROUND: Duration = Duration::from_secs(1);
 
 /// What has been rendered since rendering started anew.
 #[derive(Default)]
@@ -64,7 +69,8 @@ impl Shown {
             return 1;
         }
         let each = self.seconds / f64::from(self.spp);
-        let fits = (ROUND.as_secs_f64() / each.max(1e-9)) as u32;
+        let round = ROUND.as_secs_f64().max(ROUND_SHARE * self.seconds).min(LONGEST_ROUND.as_secs_f64());
+        let fits = (round / each.max(1e-9)) as u32;
         // Up to a power of two first: there the Sobol' points are at their best.
         fits.clamp(1, self.spp)
     }
