@@ -5,6 +5,7 @@ use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
 
 use super::tonemap::{ToneMap, to_srgb8};
 use crate::Result;
@@ -16,14 +17,9 @@ pub const NON_FINITE_SRGB8: [u8; 3] = [255, 0, 255];
 /// Tone-maps radiance to 8-bit sRGB. The second value is the number of pixels that are NaN or infinite; they are
 /// [`NON_FINITE_SRGB8`].
 pub fn tone_map_srgb8(radiance: &[[f32; 3]], exposure_ev: f32, tone_map: ToneMap) -> (Vec<[u8; 3]>, usize) {
-    let mut non_finite = 0;
-    let pixels = radiance.iter().map(|&pixel| {
-        to_srgb8(pixel, exposure_ev, tone_map).unwrap_or_else(|| {
-            non_finite += 1;
-            NON_FINITE_SRGB8
-        })
-    });
-    (pixels.collect(), non_finite)
+    let pixels: Vec<_> = radiance.par_iter().map(|&pixel| to_srgb8(pixel, exposure_ev, tone_map)).collect();
+    let non_finite = pixels.iter().filter(|pixel| pixel.is_none()).count();
+    (pixels.into_iter().map(|pixel| pixel.unwrap_or(NON_FINITE_SRGB8)).collect(), non_finite)
 }
 
 /// Writes 8-bit sRGB pixels, row by row from the top left, as a PNG: whole or not at all.
