@@ -35,11 +35,13 @@ layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 #ifdef DEBUG_PRINTS
 // The dispatch that prints has one lane; behind its result stand what it prints, and an empty header.
 uint debug_count = 0u;
-void debug_end() { results[1u + debug_count].rays = 0u; }
+void debug_end() { results[1u + debug_count].rays_and_samples = 0u; }
 void debug_write(uint header, uvec4 words) {
     if (slice.prints == 0u || debug_count >= DEBUG_RECORDS) return;
     debug_count += 1u;
-    results[debug_count] = BlockResult(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, header, words.x, words.y, words.z, words.w);
+    // Nothing is done with these floats that could change their bits.
+    vec3 bits = uintBitsToFloat(words.xyz);
+    results[debug_count] = BlockResult(bits.x, bits.y, bits.z, 0.0, 0.0, 0.0, 0.0, header, words.w);
 }
 #endif
 
@@ -441,6 +443,7 @@ void main() {
 #ifdef DEBUG_PRINTS
     if (slice.prints != 0u) debug_end();
 #endif
+    count_finished_atoms();
     // A lane without an atom has no state.
     if (lane.atom == NONE) lanes[index].atom = NONE;
     else lanes[index] = lane;

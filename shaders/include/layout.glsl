@@ -142,11 +142,8 @@ struct BlockResult {
     float compensation_r;
     float compensation_g;
     float compensation_b;
-    uint rays;
-    uint non_finite;
-    uint capped;
-    uint samples;
-    uint unused;
+    uint rays_and_samples;      // samples in the low 5 bits
+    uint non_finite_and_capped; // 16 bits each, non_finite in the low ones
 };
 
 struct AovSums {

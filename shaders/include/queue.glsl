@@ -10,6 +10,8 @@
 const uint ROUNDS_FOR_ATOMS = 24000u;
 const uint ROUNDS_FOR_RAYS = 32000u;
 
+uint finished_atoms = 0u;  // of the lane, in this dispatch
+
 void begin_extras() {
     if (HAS_AOVS) begin_aovs();
     if (HAS_STATISTICS) begin_counters();
@@ -31,7 +33,7 @@ void load_extras(uint atom) {
 void finish_atom(LaneState lane) {
     results[lane.atom] = block_result(lane);
     if (HAS_EXTRAS) store_extras(lane.atom);
-    atomicAdd(queue.done, 1u);
+    finished_atoms += 1u;
 }
 
 // Takes the slice's next atom that has samples; false if none is left.
@@ -47,6 +49,11 @@ bool take_atom(inout LaneState lane) {
     }
     lane.atom = NONE;
     return false;
+}
+
+// An atom each would keep the cores waiting for one another.
+void count_finished_atoms() {
+    if (finished_atoms > 0u) atomicAdd(queue.done, finished_atoms);
 }
 
 #endif

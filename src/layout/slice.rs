@@ -51,16 +51,32 @@ pub struct BlockResult {
     pub luminance_squared: f32,
     /// Low part of the compensated sum.
     pub compensation: [f32; 3],
-    /// Rays traced.
-    pub rays: u32,
+    /// See [`BlockResult::rays`] and [`BlockResult::samples`].
+    pub rays_and_samples: u32,
+    /// See [`BlockResult::non_finite`] and [`BlockResult::capped`].
+    pub non_finite_and_capped: u32,
+}
+
+impl BlockResult {
+    /// Rays traced; stops at 2^27 − 1.
+    pub fn rays(&self) -> u32 {
+        self.rays_and_samples >> 5
+    }
+
+    /// Samples that were ended in this block: 0 to 16.
+    pub fn samples(&self) -> u32 {
+        self.rays_and_samples & 31
+    }
+
     /// Bit i: sample i of the block was not finite.
-    pub non_finite: u32,
+    pub fn non_finite(&self) -> u32 {
+        self.non_finite_and_capped & 0xffff
+    }
+
     /// Bit i: a path of sample i was cut off by the safety cap on bounces.
-    pub capped: u32,
-    /// Paths that were ended in this block (samples).
-    pub samples: u32,
-    /// Unused, zero.
-    pub unused: u32,
+    pub fn capped(&self) -> u32 {
+        self.non_finite_and_capped >> 16
+    }
 }
 
 /// Bytes of a lane's saved state (`LaneState` in shaders/include/lane.glsl), which only shaders look into.

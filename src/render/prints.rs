@@ -44,12 +44,13 @@ impl PathTracer {
 
 /// The records behind a lane's result, up to the empty header.
 fn decode(records: &[BlockResult]) -> Vec<Printed> {
-    records.iter().take_while(|record| record.rays != 0).map(decode_record).collect()
+    records.iter().take_while(|record| record.rays_and_samples != 0).map(decode_record).collect()
 }
 
 fn decode_record(record: &BlockResult) -> Printed {
-    let header = record.rays;
-    let words = [record.non_finite, record.capped, record.samples, record.unused];
+    let header = record.rays_and_samples;
+    let [x, y, z] = record.sum.map(f32::to_bits);
+    let words = [x, y, z, record.non_finite_and_capped];
     let text = |word: &u32| match header >> 4 & 0xf {
         0 => f32::from_bits(*word).to_string(),
         1 => word.cast_signed().to_string(),
@@ -68,8 +69,9 @@ fn decode_record(record: &BlockResult) -> Printed {
 mod tests {
     use super::*;
 
-    fn record(header: u32, [non_finite, capped, samples, unused]: [u32; 4]) -> BlockResult {
-        BlockResult { rays: header, non_finite, capped, samples, unused, ..BlockResult::default() }
+    fn record(header: u32, [x, y, z, w]: [u32; 4]) -> BlockResult {
+        let sum = [x, y, z].map(f32::from_bits);
+        BlockResult { sum, rays_and_samples: header, non_finite_and_capped: w, ..BlockResult::default() }
     }
 
     #[test]

@@ -123,7 +123,7 @@ impl Run {
             statistics.add(outcome, counters);
         }
         for (index, result) in slice.results.iter().enumerate() {
-            if result.samples == 0 {
+            if result.samples() == 0 {
                 continue;
             }
             let atom = u64::from(outcome.constants.first_atom) + index as u64;
@@ -131,19 +131,19 @@ impl Run {
             let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
             let pixel = y as usize * constants.width as usize + x as usize;
             let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
-            self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples);
+            self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples());
             if let (Some(film), Some(aovs)) = (&mut self.aovs, slice.aovs) {
                 film.add_block(pixel, &aov_sample(&aovs[index], origin));
                 self.saturated_costs += u64::from(aovs[index].visits == u32::MAX);
             }
             if let Some(replicates) = &mut self.replicates {
-                replicates.add_block(pixel, block, sum, result.samples);
+                replicates.add_block(pixel, block, sum, result.samples());
             }
-            self.rays += u64::from(result.rays);
-            self.paths += u64::from(result.samples);
-            self.capped_samples += u64::from(result.capped.count_ones());
-            self.non_finite_samples += u64::from(result.non_finite.count_ones());
-            for bit in (0..BLOCK_SAMPLES).filter(|bit| result.non_finite >> bit & 1 == 1) {
+            self.rays += u64::from(result.rays());
+            self.paths += u64::from(result.samples());
+            self.capped_samples += u64::from(result.capped().count_ones());
+            self.non_finite_samples += u64::from(result.non_finite().count_ones());
+            for bit in (0..BLOCK_SAMPLES).filter(|bit| result.non_finite() >> bit & 1 == 1) {
                 if self.first_non_finite.len() < REPORTED_NON_FINITE {
                     self.first_non_finite.push(NonFiniteSample { x, y, sample: block * BLOCK_SAMPLES + bit });
                 }

@@ -138,7 +138,7 @@ impl Slice {
             dispatches += 1;
             self.dispatch(kernel, set)?;
         }
-        let rays = self.results(self.constants.atoms)?.iter().map(|result| u64::from(result.rays)).sum();
+        let rays = self.results(self.constants.atoms)?.iter().map(|result| u64::from(result.rays())).sum();
         Ok(SliceOutcome {
             constants: self.constants,
             seconds: self.submitted.elapsed().as_secs_f64(),

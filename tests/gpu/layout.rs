@@ -148,8 +148,8 @@ fn blocks_have_the_same_offsets_on_both_sides() {
     assert_eq!(shader_fields(&blocks.slice), slice);
     assert_eq!(Type::Struct(blocks.slice).nbyte(), Some(size_of::<SliceConstants>()));
 
-    let mut result = rust_fields!(BlockResult: sum, luminance_squared, compensation, rays, non_finite, capped,
-        samples, unused);
+    let mut result = rust_fields!(BlockResult: sum, luminance_squared, compensation, rays_and_samples,
+        non_finite_and_capped);
     split(&mut result, "sum", &["_r", "_g", "_b"], "f32");
     split(&mut result, "compensation", &["_r", "_g", "_b"], "f32");
     assert_eq!(shader_fields(&blocks.results.0), result);
