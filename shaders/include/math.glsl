@@ -22,14 +22,6 @@ float max_component(vec3 v) { return max(v.x, max(v.y, v.z)); }
 float sqr(float x) { return x * x; }
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 
-// n / d for 0 < d ≤ 2^31 and quotients below 2^19, exactly. Vectors have no division of integers: a driver that does not know d
-// divides lane by lane. The quotient of floats is off by 5·2^-23 of itself at most (conversions 1 ulp each, division 2.5, the
-// product 1/2), so that a little less than it is never too large, and too small by 1 at most.
-uint quotient(uint n, uint d) {
-    uint q = uint(float(n) / float(d) * (1.0 - 9.5367431640625e-7));
-    return n - q * d >= d ? q + 1u : q;
-}
-
 // A unit vector along v, for lengths whose squares under- or overflow too. v must not be zero.
 vec3 safe_normalize(vec3 v) {
     vec3 scaled = v / max_component(abs(v));

@@ -1,6 +1,5 @@
 #version 460
-// math.glsl at one number a lane: x -> cos and sin of x turns; x, y -> the angle of (x, y) in turns; the floats next to y; the
-// quotient of x and y, taken as whole numbers.
+// math.glsl at one number a lane: x -> cos and sin of x turns; x, y -> the angle of (x, y) in turns; the floats next to y.
 #include "../include/test_kernel.glsl"
 #include "../include/math.glsl"
 
@@ -11,5 +10,4 @@ void main() {
     vec2 cs = cos_sin_turns(x.x);
     outputs[2u * lane] = floatBitsToUint(vec4(cs, turns(x.z, x.y), atan_unit(x.w)));
     outputs[2u * lane + 1u] = floatBitsToUint(vec4(next_float_up(x.y), next_float_down(x.y), 0.0, 0.0));
-    outputs[2u * lane + 1u].z = quotient(inputs[lane].x, max(inputs[lane].y, 1u));
 }

@@ -178,6 +178,19 @@ fn a_worker_that_ends_while_the_scene_is_broken_starts_once_it_is_mended() {
     watch.expect(&["scene.gltf:", "first image", "64 spp"]);
 }
 
+#[test]
+fn a_scene_that_was_gone_is_shown_once_it_is_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, away] = ["scene.gltf", "away"].map(|name| folder.path().join(name));
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/textured.gltf"), &scene).unwrap();
+    let watch = Watch::of(&scene, &["--spp", "16"]);
+    watch.expect(&["start:", "16 spp"]);
+    std::fs::rename(&scene, &away).unwrap();
+    watch.expect(&["edit 1 cannot be shown", "scene.gltf", "no such file"]);
+    std::fs::rename(&away, &scene).unwrap();
+    watch.expect(&["scene.gltf:", "first image", "16 spp"]);
+}
+
 /// The text with a part replaced that must be in it.
 #[cfg(target_os = "linux")]
 fn replaced(text: &str, part: &str, by: &str) -> String {

@@ -36,12 +36,15 @@ impl Session {
         Ok(())
     }
 
-    /// Takes the files of the scene anew: it may name others now.
+    /// Takes the files of the scene anew: it may name others now. One that is gone (moved away, or never a file but a built-in
+    /// scene) keeps those that it had: it may come back.
     pub(super) fn track_scene(&mut self) -> Result<()> {
         let scene = Path::new(&self.options.scene);
-        let mut files = if scene.is_file() { files_of(scene) } else { Vec::new() };
-        files.extend(self.options.environment.clone());
-        self.scene_files = files.iter().map(|file| absolute(file)).collect();
+        if scene.is_file() {
+            self.scene_files = files_of(scene).iter().map(|file| absolute(file)).collect();
+        }
+        let environment = self.options.environment.as_deref().map(absolute);
+        self.scene_files.extend(environment.filter(|file| !self.scene_files.contains(file)));
         for file in &self.scene_files {
             if let Some(folder) = file.parent().filter(|folder| folder.is_dir()) {
                 self.tracker.add(folder, false)?;
