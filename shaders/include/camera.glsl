@@ -10,12 +10,15 @@ struct CameraRay {
     vec3 direction;
 };
 
+bool is_orthographic(RenderConstants constants) {
+    return HAS_ORTHOGRAPHIC && (!FOR_ANY_SCENE || constants.projection == PROJECTION_ORTHOGRAPHIC);
+}
+
 // `pixel` counts from the top left; `u` is the position in the pixel (xy) and on the lens (zw), all in [0, 1).
 CameraRay camera_ray(RenderConstants constants, uvec2 pixel, vec4 u) {
     vec2 film = (vec2(pixel) + u.xy) / vec2(constants.width, constants.height) * 2.0 - 1.0;
     vec3 offset = constants.camera_right * film.x - constants.camera_up * film.y;
-    if (HAS_ORTHOGRAPHIC && (!FOR_ANY_SCENE || constants.projection == PROJECTION_ORTHOGRAPHIC))
-        return CameraRay(constants.camera_origin + offset, constants.camera_forward);
+    if (is_orthographic(constants)) return CameraRay(constants.camera_origin + offset, constants.camera_forward);
     vec3 direction = constants.camera_forward + offset;
     if (!HAS_LENS || (FOR_ANY_SCENE && constants.lens_radius == 0.0))
         return CameraRay(constants.camera_origin, normalize(direction));

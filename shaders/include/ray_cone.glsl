@@ -4,9 +4,7 @@
 // pixel, and never wider than known: what would widen it is left out, what may narrow it is not (docs/estimators.md).
 #ifndef RAY_CONE_GLSL
 #define RAY_CONE_GLSL
-#include "features.glsl"
-#include "layout.glsl"
-#include "math.glsl"
+#include "camera.glsl"
 
 struct RayCone {
     float width;   // at the ray's origin, in metres
@@ -25,7 +23,7 @@ RayCone camera_cone(RenderConstants constants, vec3 direction) {
     vec2 half_size = vec2(length(constants.camera_right), length(constants.camera_up));
     vec2 pixel = 2.0 * half_size / vec2(constants.width, constants.height);
     float width = CONE_PIXEL_SHARE * min(pixel.x, pixel.y);
-    if (HAS_ORTHOGRAPHIC && (!FOR_ANY_SCENE || constants.projection == PROJECTION_ORTHOGRAPHIC)) return RayCone(width, 0.0);
+    if (is_orthographic(constants)) return RayCone(width, 0.0);
     return RayCone(0.0, width * sqr(dot(direction, constants.camera_forward)));
 }
 

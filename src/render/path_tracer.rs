@@ -273,7 +273,8 @@ impl PathTracer {
             }
             while run.stopped_by == StopReason::Samples && !schedule.is_done() {
                 let Some(slot) = free.pop() else { break };
-                let constants = schedule.next(self.sizes.next_atoms(), self.slices[slot].lanes(), self.sizes.ray_budget());
+                let constants =
+                    schedule.next(self.sizes.next_atoms(), self.slices[slot].lanes(), self.sizes.ray_budget());
                 self.slices[slot].submit(&self.kernel, slot, constants)?;
                 in_flight.push_back(slot);
             }

@@ -11,7 +11,9 @@ use super::kernel_build::BindingOverride;
 use super::kernel_key::KernelKey;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
-use crate::layout::{AovSums, BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue};
+use crate::layout::{
+    AovSums, BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue,
+};
 
 /// Slices that are submitted before the oldest is read.
 pub(super) const SLICES_IN_FLIGHT: usize = 2;

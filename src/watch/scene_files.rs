@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-/// The scene file and the buffers, images, environments and material libraries that it names. What cannot be read names nothing: the
-/// loader says what is wrong with it.
+/// The scene file and the buffers, images, environments and material libraries that it names. What cannot be read names
+/// nothing: the loader says what is wrong with it.
 pub fn files_of(scene: &Path) -> Vec<PathBuf> {
     let folder = scene.parent().unwrap_or(Path::new(""));
     let mut files = vec![scene.to_owned()];
