@@ -1,6 +1,7 @@
 //! `sunfleck watch`: the shader loop. The hidden `watch-worker` is the process that renders for it.
 
 use std::ffi::OsString;
+use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::time::Duration;
 
@@ -179,7 +180,15 @@ fn listen(args: &WatchArgs) -> Result<Serving> {
         Some(port) => bind(port),
         None => bind(PORT).or_else(|_| bind(0)),
     };
-    let failed = |e| Error::Usage(format!("cannot listen on {} port {}: {e}", args.bind, args.port.unwrap_or(PORT)));
+    let failed = |e: io::Error| {
+        let remedy = match e.kind() {
+            io::ErrorKind::AddrInUse => "; give another by --port, or --port 0 for any that is free",
+            io::ErrorKind::AddrNotAvailable => "; --bind takes an address of this machine",
+            _ => "",
+        };
+        let port = args.port.unwrap_or(PORT);
+        Error::Usage(format!("cannot listen on {} port {port}: {e}{remedy}", args.bind))
+    };
     let listener = listener.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let token = if args.bind.is_loopback() { None } else { Some(new_token()?) };

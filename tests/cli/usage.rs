@@ -185,3 +185,10 @@ fn shaders_are_exported_and_checked() {
     let (code, _, stderr) = run_in(folder.path(), &["shaders", "check", "nowhere"]);
     assert!(code == 3 && stderr.contains("nowhere"), "{code}: {stderr}");
 }
+
+#[test]
+fn a_port_in_use_is_an_error_that_says_what_to_do() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    refused(&["watch", "cornell", "--port", &port], 2, &["cannot listen", &port, "--port 0"]);
+}
