@@ -173,7 +173,7 @@ pub(super) struct SliceSizes {
     ray_budget: u32,
     target: Duration,
     fixed_atoms: Option<u32>,
-    fixed_budget: Option<u32>,
+    fixed_budget: bool,
 }
 
 impl SliceSizes {
@@ -191,7 +191,7 @@ impl SliceSizes {
             ray_budget: overrides.ray_budget.unwrap_or(1024),
             target: overrides.slice_time.unwrap_or(TARGET),
             fixed_atoms: overrides.slice_atoms,
-            fixed_budget: overrides.ray_budget,
+            fixed_budget: overrides.ray_budget.is_some(),
         }
     }
 
@@ -218,9 +218,8 @@ impl SliceSizes {
         let own = outcome.seconds / SLICES_IN_FLIGHT as f64;
         let factor = (self.target.as_secs_f64() / own.max(1e-6)).clamp(0.25, 2.0);
         let paths = u64::from(outcome.constants.atoms) * u64::from(self.atom_paths);
-        let most = u64::from(self.largest) * u64::from(self.atom_paths);
-        self.paths = ((paths as f64 * factor) as u64).min(most);
-        if self.fixed_budget.is_none() {
+        self.paths = (paths as f64 * factor) as u64;
+        if !self.fixed_budget {
             // Most atoms end within a few times the mean; the rest go on in another dispatch.
             let mean = outcome.rays / u64::from(outcome.constants.atoms.max(1));
             self.ray_budget = u32::try_from(8 * mean).unwrap_or(u32::MAX).clamp(256, 1 << 16);

@@ -178,26 +178,26 @@ fn counts_add_up_and_do_not_depend_on_slices() {
     }
 }
 
-/// Vectors cannot be fuller than full, nor empty. A scene in which all lanes do the same has full ones, but for the last of a
-/// slice, whose atoms a CPU's threads share in any way: 7 lanes a thread may find none, with 64 threads 3.4 % in all eight slices.
+/// Vectors cannot be fuller than full, nor empty, and a scene in which all lanes do the same has full ones: in slices of one
+/// workgroup, where no other thread takes a part of the atoms that a vector could have.
 #[test]
 fn occupancy_is_a_share() {
-    let run_of = |scene: &Scene, side, spp| run(scene, &Settings { bake: false, ..counted(side, side) }, spp);
-    let spheres = run_of(&scene_file("cornell_spheres"), 64, 16);
+    let settings = Settings { bake: false, ..counted(64, 64) };
+    let one_workgroup =
+        BindingOverride { slice_atoms: Some(64), workgroup_size: Some(64), ..BindingOverride::default() };
+    let spheres = run(&scene_file("cornell_spheres"), &settings, 16);
     let statistics = statistics(&spheres);
     for occupancy in [statistics.search, statistics.shading] {
         let share = occupancy.share().expect("something ran");
         assert!(share > 0.05 && share <= 1.0, "{share}");
     }
     // A wall that no ray meets, and a black one that every ray does.
-    for (corner, size, is_met) in [(100.0, 1.0, false), (-4.0, 8.0, true)] {
+    for (corner, size, shading) in [(100.0, 1.0, None), (-4.0, 8.0, Some(1.0))] {
         let wall = rectangle(DVec3::new(corner, corner, 0.0), DVec3::X * size, DVec3::Y * size, 0);
         let mut alike = scene(vec![wall], vec![Material::lambertian("wall", [0.0; 3])], pixel_camera(4.0));
         alike.environment = Environment::Constant([1.0; 3]);
-        let report = run_of(&alike, 256, 4).statistics.expect("asked for").report();
-        assert_eq!(report.shading_occupancy.is_some(), is_met, "{report:?}");
-        for share in [report.search_occupancy.or(Some(0.0)), report.shading_occupancy].into_iter().flatten() {
-            assert!(share > 0.95 && share <= 1.0, "{report:?}");
-        }
+        let run = gpu::run(&mut gpu::path_tracer_with(&alike, &settings, one_workgroup), 1, 16);
+        let report = run.statistics.expect("asked for").report();
+        assert_eq!((report.search_occupancy, report.shading_occupancy), (Some(1.0), shading), "{report:?}");
     }
 }

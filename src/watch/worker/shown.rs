@@ -69,7 +69,7 @@ impl Shown {
             return 1;
         }
         let each = self.seconds / f64::from(self.spp);
-        let round = ROUND.as_secs_f64().max(ROUND_SHARE * self.seconds).min(LONGEST_ROUND.as_secs_f64());
+        let round = (ROUND_SHARE * self.seconds).clamp(ROUND.as_secs_f64(), LONGEST_ROUND.as_secs_f64());
         let fits = (round / each.max(1e-9)) as u32;
         // Up to a power of two first: there the Sobol' points are at their best.
         fits.clamp(1, self.spp)
