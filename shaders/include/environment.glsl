@@ -26,6 +26,10 @@ vec3 environment_to_world(RenderConstants constants, vec3 w) {
     return vec3(c * w.x + s * w.z, w.y, -s * w.x + c * w.z);
 }
 
+bool environment_is_sampled_by_texels() {
+    return HAS_IMAGE_ENVIRONMENT && ENVIRONMENT_SAMPLING == ENVIRONMENT_SAMPLING_IMPORTANCE;
+}
+
 vec2 environment_uv(vec3 w) {
     float sine = sqrt(w.x * w.x + w.z * w.z);
     // The polar angle is at most half a turn.
@@ -40,10 +44,34 @@ vec4 environment_texel(RenderConstants constants, int x, int y) {
     return uintBitsToFloat(LOAD4(ENVIRONMENT, uint(y * width + x)));
 }
 
+bool environment_is_rgbe(RenderConstants constants) {
+    return HAS_RGBE_ENVIRONMENT && (!FOR_ANY_SCENE || constants.environment_rgbe != 0u);
+}
+
+// Radiance as src/prepare/environment_quads.rs stores it. The scale is a normal float.
+vec3 rgbe_radiance(uint word) {
+    return vec3(word & 255u, (word >> 8u) & 255u, (word >> 16u) & 255u) * uintBitsToFloat(((word >> 24u) - 9u) << 23u);
+}
+
+// The same as below from quads: one element holds the four texels, another their probabilities.
+vec4 environment_interpolate_quads(RenderConstants constants, ivec2 corner, vec2 low, vec2 high) {
+    int width = int(constants.environment_width);
+    int height = int(constants.environment_height);
+    int x = corner.x < 0 ? corner.x + width : corner.x;
+    uint quad = uint(clamp(corner.y + 1, 0, height) * width + x);
+    uvec4 words = LOAD4(ENVIRONMENT, quad);
+    vec4 p = vec4(0.0);
+    if (environment_is_sampled_by_texels()) p = uintBitsToFloat(LOAD4(ENVIRONMENT, quad + uint(width * (height + 1))));
+    vec4 top = vec4(rgbe_radiance(words.x), p.x) * low.x + vec4(rgbe_radiance(words.y), p.y) * high.x;
+    vec4 bottom = vec4(rgbe_radiance(words.z), p.z) * low.x + vec4(rgbe_radiance(words.w), p.w) * high.x;
+    return (top * low.y + bottom * high.y) * vec4(constants.environment_radiance, 1.0);
+}
+
 // The four texels from `corner` on, weighted by those of its column and row (`low`) and of the next ones (`high`). All
 // terms are positive, so the sum is good to 6 roundings also where a texel of 10⁹ fades out: radiance and density are
 // as exact as each other.
 vec4 environment_interpolate(RenderConstants constants, ivec2 corner, vec2 low, vec2 high) {
+    if (environment_is_rgbe(constants)) return environment_interpolate_quads(constants, corner, low, high);
     vec4 top = environment_texel(constants, corner.x, corner.y) * low.x +
                environment_texel(constants, corner.x + 1, corner.y) * high.x;
     vec4 bottom = environment_texel(constants, corner.x, corner.y + 1) * low.x +
@@ -56,10 +84,6 @@ vec4 environment_lookup(RenderConstants constants, vec2 uv) {
     vec2 corner = floor(p);
     vec2 f = p - corner;
     return environment_interpolate(constants, ivec2(corner), 1.0 - f, f);
-}
-
-bool environment_is_sampled_by_texels() {
-    return HAS_IMAGE_ENVIRONMENT && ENVIRONMENT_SAMPLING == ENVIRONMENT_SAMPLING_IMPORTANCE;
 }
 
 // Radiance that arrives from direction `w`, and the density with which environment_sample draws it.

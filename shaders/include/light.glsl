@@ -24,6 +24,9 @@ bool scene_has_lights() { return LIGHTS != 0u; }
 const bool ONLY_NEAR_LIGHTS = (LIGHTS & (1u << LIGHT_DIRECTIONAL | 1u << LIGHT_ENVIRONMENT)) == 0u;
 
 uint baked_light_start(uint index) { return baked_light_cdf_0(index).x; }
+float baked_light_probability(uint light) {
+    return cdf_probability(baked_light_start(light + 1u) - baked_light_start(light));
+}
 
 // cdf_sample_TABLES over the lights.
 CdfSample baked_light_pick(uint bits) {
@@ -48,7 +51,7 @@ CdfSample light_pick(RenderConstants constants, LightReceiver receiver, uint bit
 
 // Probability with which light_pick picks a light.
 float light_pick_probability(RenderConstants constants, LightReceiver receiver, uint light) {
-    if (BAKES_LIGHTS && !HAS_LIGHT_BVH) return cdf_probability(baked_light_start(light + 1u) - baked_light_start(light));
+    if (BAKES_LIGHTS && !HAS_LIGHT_BVH) return baked_light_probability(light);
     if (!HAS_LIGHT_BVH) return cdf_probability_TABLES(constants.light_cdf_word, light);
     if (ONLY_NEAR_LIGHTS || light < constants.near_lights) return light_bvh_probability(constants, receiver, light);
     return cdf_probability_TABLES(constants.light_cdf_word, light - constants.near_lights);
@@ -56,6 +59,7 @@ float light_pick_probability(RenderConstants constants, LightReceiver receiver, 
 
 // The same for a light that is known to have no place: the receiver does not matter.
 float far_light_pick_probability(RenderConstants constants, uint light) {
+    if (BAKES_LIGHTS && !HAS_LIGHT_BVH) return baked_light_probability(light);
     return cdf_probability_TABLES(constants.light_cdf_word, HAS_LIGHT_BVH ? light - constants.near_lights : light);
 }
 

@@ -42,7 +42,8 @@ bool take_atom(inout LaneState lane) {
         rounds += 1u;
         uint atom = atomicAdd(queue.taken, 1u);
         if (atom >= slice.atoms) break;
-        begin_atom(lane, constants, slice, atom);
+        uint tile = slice_tiles[(slice.first_atom % TILE_PIXELS + atom) / TILE_PIXELS];
+        begin_atom(lane, constants, slice, atom, tile);
         if (HAS_EXTRAS) begin_extras();
         if (lane.sample_index < lane.end_sample) return true;
         finish_atom(lane);

@@ -15,6 +15,9 @@ const uint LIST_MASK = (1u << LIST_BITS) - 1u;
 // Below this entry lies the world level; it stands for "leave the instance". No group is that large.
 const uint LEAVE_INSTANCE = 0xffffff80u;
 
+// A flag of Trace::first.
+const uint ASKS = 0x80000000u;
+
 struct Trace {
     vec3 origin;  // the ray in the space of `instance`
     vec3 inverse_direction;
@@ -34,6 +37,9 @@ struct Trace {
     TriangleId towards;
     vec3 world_origin;
     vec3 world_direction;
+    // Of the current slot, triangles with lower numbers are done. With ASKS, a triangle with alpha would be the hit, and the
+    // search stays at its slot until it is known whether it is there.
+    uint first;
     uvec2 alpha_key;
 };
 
@@ -89,6 +95,7 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alph
     trace.towards = ray.towards;
     trace.world_origin = ray.origin;
     trace.world_direction = ray.direction;
+    trace.first = 0u;
     trace.alpha_key = alpha_key;
     if (BAKES_GEOMETRY) {
         // Done at once.
@@ -97,6 +104,7 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alph
     }
 }
 
+bool asks(Trace trace) { return (trace.first & ASKS) != 0u; }
 bool trace_done(Trace trace) { return trace.current == NONE; }
 Hit trace_hit(Trace trace) { return Hit(trace.hit.triangle, trace.hit.t, trace.hit.barycentric / trace.determinant); }
 
@@ -165,27 +173,31 @@ void visit_inner(Trace trace, uvec4 q0, uvec4 q1, uvec4 q2, out uint next, out u
     next = key_0 != MISSED ? (q2.z << 2u | uint(key_0 & 3)) : NONE;
 }
 
-// The triangle becomes the hit if the ray meets it before. `edges` are its edge functions, opposite to its vertices in turn,
-// which are the weights of the vertices' sheared `depths` but for a factor.
-void visit_triangle(inout Trace trace, RenderConstants constants, uint number, vec3 edges, vec3 depths) {
+// The triangle becomes the hit if the ray meets it before; one with alpha is asked first. `edges` are its edge functions,
+// opposite to its vertices in turn, which are the weights of the vertices' sheared `depths` but for a factor.
+void visit_triangle(inout Trace trace, uint number, vec3 edges, vec3 depths, bool has_alpha) {
     precise float determinant = edges.x + edges.y + edges.z;
     precise float scaled_t = (edges.x * depths.x + edges.y * depths.y + edges.z * depths.z) * trace.space.shear.z;
     bool inside = all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)));
     float t = scaled_t / determinant;
     TriangleId triangle = TriangleId(number, trace.instance);
     bool excluded = same_triangle(triangle, trace.from) || same_triangle(triangle, trace.towards);
+    // With ASKS, all wait.
+    if (HAS_ALPHA) excluded = excluded || number < trace.first;
     // A zero determinant gives an infinite or undefined t, which fails here; that of an absent triangle is zero, see below.
-    if (inside && determinant != 0.0 && t > 0.0 && t < trace.hit.t && !excluded) {
-        if (HAS_ALPHA) {
-            uint kind = load_triangle_kind(constants, number);
-            if ((kind & TRIANGLE_ALPHA) != 0u &&
-                !alpha_hits(constants, trace.alpha_key, triangle_look(constants, kind, trace.instance).material, number,
-                            trace.instance, edges.yz / determinant))
-                return;
-        }
+    bool meets = inside && determinant != 0.0 && t > 0.0 && t < trace.hit.t && !excluded;
+    if (HAS_ALPHA && meets && has_alpha) trace.first = number | ASKS;
+    if (meets && !(HAS_ALPHA && has_alpha)) {
         trace.hit = Hit(triangle, t, edges.yz);
         trace.determinant = determinant;
     }
+}
+
+// A leaf whose triangles have alpha begins with the vertex of its diagonal whose words are the larger (src/prepare/pairs.rs).
+bool leaf_has_alpha(uvec4 q0, uvec4 q1, uvec4 q2) {
+    uvec3 a = q0.xyz;
+    uvec3 c = uvec3(q1.zw, q2.x);
+    return a.x != c.x ? a.x > c.x : (a.y != c.y ? a.y > c.y : a.z > c.z);
 }
 
 // Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": vertices are sheared into ray space, each by the
@@ -196,7 +208,8 @@ void visit_triangle(inout Trace trace, RenderConstants constants, uint number, v
 // Both triangles of the slot are tested, (a, b, c) and (a, c, d). Their common edge is computed once: the other way round,
 // the difference of the same products has the opposite sign exactly. Where d is a, the second has the edge functions e, 0
 // and −e, whose sum is zero.
-void visit_leaf(inout Trace trace, RenderConstants constants, uvec4 q0, uvec4 q1, uvec4 q2) {
+void visit_leaf(inout Trace trace, uvec4 q0, uvec4 q1, uvec4 q2) {
+    bool has_alpha = HAS_ALPHA && leaf_has_alpha(q0, q1, q2);
     precise vec3 a = rotate_axis(uintBitsToFloat(q0.xyz) - trace.origin, trace.space.axis);
     precise vec3 b = rotate_axis(uintBitsToFloat(uvec3(q0.w, q1.xy)) - trace.origin, trace.space.axis);
     precise vec3 c = rotate_axis(uintBitsToFloat(uvec3(q1.zw, q2.x)) - trace.origin, trace.space.axis);
@@ -210,8 +223,8 @@ void visit_leaf(inout Trace trace, RenderConstants constants, uvec4 q0, uvec4 q1
     precise float ab = pb.x * pa.y - pb.y * pa.x;
     precise float cd = pd.x * pc.y - pd.y * pc.x;
     precise float da = pa.x * pd.y - pa.y * pd.x;
-    visit_triangle(trace, constants, 2u * trace.current, vec3(bc, ca, ab), vec3(a.z, b.z, c.z));
-    visit_triangle(trace, constants, 2u * trace.current + 1u, vec3(cd, da, -ca), vec3(a.z, c.z, d.z));
+    visit_triangle(trace, 2u * trace.current, vec3(bc, ca, ab), vec3(a.z, b.z, c.z), has_alpha);
+    visit_triangle(trace, 2u * trace.current + 1u, vec3(cd, da, -ca), vec3(a.z, c.z, d.z), has_alpha);
 }
 
 // Continues at the instance's root with the ray in object space; t keeps its meaning since the direction is not rescaled.
@@ -254,7 +267,8 @@ void trace_step(inout Trace trace, RenderConstants constants) {
         return;
     }
     if (leaf) {
-        visit_leaf(trace, constants, q0, q1, q2);
+        visit_leaf(trace, q0, q1, q2);
+        if (HAS_ALPHA && asks(trace)) return;
         if (trace.any_hit && trace.hit.triangle.slot != NONE) {
             trace.current = NONE;
             return;
@@ -274,6 +288,23 @@ void trace_step(inout Trace trace, RenderConstants constants) {
         trace.top = entry;
     }
     trace.current = next;
+    if (HAS_ALPHA) trace.first = 0u;
+}
+
+// The triangle that is asked becomes the hit if its surface is there. Not within a step, where all lanes would run it for the
+// few that ask, at both triangles. It is met again, by the same operations as in visit_leaf: to keep what was found would cost
+// every step more.
+void answer(inout Trace trace, RenderConstants constants) {
+    uint number = trace.first & ~ASKS;
+    trace.first = number + 1u;
+    TriangleVertices v = load_triangle(number);
+    TriangleMeeting meeting = meet_triangle(trace.space, trace.origin, v.a, v.b, v.c);
+    TriangleLook look = triangle_look(constants, load_triangle_kind(constants, number), trace.instance);
+    if (!alpha_hits(constants, trace.alpha_key, look.material, number, trace.instance, meeting.scaled / meeting.determinant))
+        return;
+    trace.hit = Hit(TriangleId(number, trace.instance), meeting.t, meeting.scaled);
+    trace.determinant = meeting.determinant;
+    if (trace.any_hit) trace.current = NONE;
 }
 
 // Steps until the next look at which lanes are done: more leave finished lanes idle, fewer have them do what follows in small
@@ -285,7 +316,8 @@ uint trace_advance_rounds() { return uint(STEPS_PER_ADVANCE) + 1u; }
 
 void trace_advance(inout Trace trace, RenderConstants constants) {
     for (int i = 0; i < STEPS_PER_ADVANCE; ++i) {
-        if (trace.current == NONE) break;
+        if (trace.current == NONE || (HAS_ALPHA && asks(trace))) break;
         trace_step(trace, constants);
     }
+    if (HAS_ALPHA && asks(trace)) answer(trace, constants);
 }

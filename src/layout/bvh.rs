@@ -33,7 +33,8 @@ pub struct InnerSlot {
 
 /// One triangle, or two that share an edge and turn the same way: (0, 1, 2) and (0, 2, 3), vertices as they are (so that
 /// neighbours test a shared edge alike). Where there is one, vertex 3 is vertex 0. Its triangles have the numbers
-/// twice its slot and one more.
+/// twice its slot and one more. In a scene with alpha, they have it where the words of vertex 0 are larger than those of
+/// vertex 2, x before y before z.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LeafSlot {

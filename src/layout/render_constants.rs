@@ -85,6 +85,8 @@ pub struct RenderConstants {
     pub clamp_indirect: f32,
     /// 0, which no compiler knows.
     pub zero: f32,
+    /// 1 if the environment's texels are in RGBE, as quads (src/prepare/environment.rs).
+    pub environment_rgbe: u32,
     /// Unused, zero.
-    pub unused: [u32; 3],
+    pub unused: [u32; 2],
 }

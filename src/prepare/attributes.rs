@@ -108,6 +108,7 @@ pub(super) fn add_primitive(
     }
     mesh.triangles += kept.len() as u32;
     mesh.leaves.extend(pairs(&kept, &positions).into_iter().map(|pair| {
+        let pair = if materials.has_alpha { pair.begun(&kept, &positions, used.alpha) } else { pair };
         let vertices = |(index, corner): (u32, usize)| {
             turned(kept[index as usize], corner).map(|vertex| positions[vertex as usize])
         };

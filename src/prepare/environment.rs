@@ -6,12 +6,14 @@
 //!
 //! The array holds the texels as (r, g, b, p), row by row from the top, p the probability of picking the texel times
 //! width·height/2π² (0 if texels are not picked), then in words the marginal CDF over rows (`height + 1`) with its guide, and
-//! a conditional CDF (`width + 1`) with its guide for each row.
+//! a conditional CDF (`width + 1`) with its guide for each row. Where RGBE is exact, quads of the radiance and, if texels are
+//! picked, quads of p take the texels' place.
 
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
+use super::environment_quads::{quads, rgbe_words};
 use super::{EnvironmentSampling, PrepareError, cdf, luminance};
 use crate::layout::Texel;
 use crate::scene::Environment;
@@ -23,6 +25,8 @@ pub struct PreparedEnvironment {
     pub kind: EnvironmentKind,
     /// Contents of the environment array.
     pub array: Vec<Texel>,
+    /// Its texels are in RGBE, as quads.
+    pub rgbe: bool,
     /// Image width.
     pub width: u32,
     /// Image height.
@@ -96,9 +100,14 @@ fn image(
         return Err(PrepareError::EnvironmentTooLarge { width, height });
     }
     let tents = Tents::new(width, height, texels, sampling);
+    let rgbe = rgbe_words(texels);
     let mut prepared = PreparedEnvironment {
         kind: EnvironmentKind::Image,
-        array: texels.iter().map(|&[r, g, b]| [r.to_bits(), g.to_bits(), b.to_bits(), 0]).collect(),
+        array: match &rgbe {
+            Some(words) => quads(width as usize, words),
+            None => texels.iter().map(|&[r, g, b]| [r.to_bits(), g.to_bits(), b.to_bits(), 0]).collect(),
+        },
+        rgbe: rgbe.is_some(),
         width,
         height,
         radiance: [strength; 3],
@@ -107,7 +116,9 @@ fn image(
         ..PreparedEnvironment::default()
     };
     if sampling != EnvironmentSampling::Uniform {
-        prepared.marginal_word = texel_words as u32;
+        let quads = if prepared.rgbe { prepared.array.len() } else { 0 };
+        prepared.array.resize(prepared.array.len() + quads, Texel::default());
+        prepared.marginal_word = 4 * prepared.array.len() as u32;
         prepared.conditional_word = prepared.marginal_word + guided_words(height) as u32;
         prepared.array.extend(super::pack_words(&tents.cdf_words()));
         prepared.store_probabilities();
@@ -196,12 +207,17 @@ impl PreparedEnvironment {
         self.array.as_flattened()
     }
 
-    /// The fourth word of each texel, from the CDFs as they are stored.
+    /// The fourth word of each texel, or the quads of it, from the CDFs as they are stored.
     fn store_probabilities(&mut self) {
         let (width, height) = (self.width as usize, self.height as usize);
         let factor = (width * height) as f64 / (2.0 * PI * PI);
-        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-            self.array[y * width + x][3] = ((self.texel_probability(x, y) * factor) as f32).to_bits();
+        let word = |(y, x)| ((self.texel_probability(x, y) * factor) as f32).to_bits();
+        let words: Vec<u32> = (0..height).flat_map(|y| (0..width).map(move |x| (y, x))).map(word).collect();
+        if self.rgbe {
+            let quads = quads(width, &words);
+            self.array[quads.len()..][..quads.len()].copy_from_slice(&quads);
+        } else {
+            self.array.iter_mut().zip(words).for_each(|(texel, word)| texel[3] = word);
         }
     }
 

@@ -55,6 +55,8 @@ pub struct Features {
     pub environment: EnvironmentKind,
     /// The environment is picked by its CDFs.
     pub environment_importance: bool,
+    /// The environment's texels are in RGBE.
+    pub environment_rgbe: bool,
 }
 
 impl Features {
@@ -100,6 +102,7 @@ impl Features {
             ("constant-environment", self.environment == EnvironmentKind::Constant),
             ("image-environment", self.environment == EnvironmentKind::Image),
             ("environment-importance", self.environment_importance),
+            ("environment-rgbe", self.environment_rgbe),
         ]
     }
 

@@ -23,6 +23,8 @@ pub(super) struct MaterialTable {
     pub records: Vec<Material>,
     /// By index of the scene's material.
     uses: Vec<Option<MaterialUse>>,
+    /// Traversal decides where some surface is there.
+    pub has_alpha: bool,
     /// By index of the record: the emission texture, if the surface emits by one.
     emission_maps: Vec<Option<EmissionMap>>,
 }
@@ -75,6 +77,7 @@ impl MaterialTable {
                 if table.uses[primitive.material].is_none() {
                     let used = table.add(scene, primitive.material, textures)?;
                     table.uses[primitive.material] = Some(used);
+                    table.has_alpha |= used.alpha;
                 }
             }
         }

@@ -79,6 +79,7 @@ pub(super) fn pack_arrays(
         environment_marginal_word: environment.marginal_word,
         environment_conditional_word: environment.conditional_word,
         ggx_albedo: append_albedos(&mut tables, materials, features),
+        environment_rgbe: environment.rgbe.into(),
         environment_radiance: environment.radiance,
         environment_cos: cos as f32,
         environment_sin: sin as f32,
@@ -130,6 +131,7 @@ pub(super) fn features(
         vertex_colors: any(TRIANGLE_COLORS),
         environment: environment.kind,
         environment_importance: environment.conditional_word != 0,
+        environment_rgbe: environment.rgbe,
         light_choice: lights.choice,
         ..Features::default()
     };

@@ -15,6 +15,28 @@ pub(super) struct Pair {
     pub(super) second: Option<(u32, usize)>,
 }
 
+impl Pair {
+    /// The same triangles, begun so that the vertices of their diagonal, the leaf's first and third, say whether they have
+    /// alpha: the first has then the larger words, x before y before z. Of both ways to begin a pair, and of the three to begin
+    /// a triangle, one is so; only a triangle without area has two vertices in one place.
+    pub(super) fn begun(self, triangles: &[[u32; 3]], positions: &[[f32; 3]], alpha: bool) -> Self {
+        let words = |vertex: u32| positions[vertex as usize].map(f32::to_bits);
+        let fits = |(triangle, corner): (u32, usize)| {
+            let [a, _, c] = turned(triangles[triangle as usize], corner);
+            (words(a) > words(c)) == alpha
+        };
+        let (first, corner) = self.first;
+        match self.second {
+            Some(_) if fits(self.first) => self,
+            Some((second, from)) => Self { first: (second, (from + 1) % 3), second: Some((first, (corner + 2) % 3)) },
+            None => {
+                let corner = (0..3).find(|&corner| fits((first, corner))).unwrap_or(corner);
+                Self { first: (first, corner), second: None }
+            }
+        }
+    }
+}
+
 /// Three indices in the same cyclic order, the one at `corner` first.
 pub(super) fn turned<T: Copy>(triangle: [T; 3], corner: usize) -> [T; 3] {
     [triangle[corner], triangle[(corner + 1) % 3], triangle[(corner + 2) % 3]]

@@ -131,6 +131,7 @@ impl KernelKey {
             f.panes,
             // FOR_ANY_SCENE: it is for this one.
             false,
+            f.environment_rgbe,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {

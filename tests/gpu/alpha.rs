@@ -93,6 +93,28 @@ fn sheets_mix_with_the_background() {
     }
 }
 
+/// Two triangles that share an edge share a leaf. A ray that crosses both asks each, whichever comes first.
+#[test]
+fn both_triangles_of_a_folded_leaf_are_asked() {
+    let fold = |towards: f32| Primitive {
+        positions: vec![[-8.0, 0.0, -4.0], [8.0, 0.0, -4.0], [0.0, 0.5 * towards, 12.0], [0.0, -0.5 * towards, 12.0]],
+        triangles: vec![[0, 1, 2], [1, 0, 3]],
+        ..square(0.0, 1.0, 0)
+    };
+    let alpha = 0.3;
+    for towards in [1.0, -1.0] {
+        let mut scene = Scene { meshes: stack(1, alpha, false).meshes, ..stack(1, alpha, false) };
+        scene.meshes[0].primitives = vec![fold(towards)];
+        let means = image_mean(&scene, &settings(0));
+        for (channel, mean) in means.iter().enumerate() {
+            let mix =
+                |through: f64| f64::from(SHEET[channel]) * (1.0 - through) + f64::from(BACKGROUND[channel]) * through;
+            let through = (1.0 - f64::from(alpha)).powi(2);
+            assert_is(&format!("fold {towards}, {channel}"), mean, mix(through), mix(1.0 - f64::from(alpha)), 6);
+        }
+    }
+}
+
 /// What needs no decision is exact: every sample is the sheet's colour, or the background's.
 #[test]
 fn alpha_of_zero_and_one_are_nothing_and_everything() {

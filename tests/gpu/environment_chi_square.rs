@@ -41,6 +41,17 @@ impl Image {
         Self { width, height, texels, rotation }
     }
 
+    /// The same, rounded to what RGBE holds exactly, so that it is stored as quads.
+    fn rgbe(width: usize, height: usize, rotation: f64) -> Self {
+        let mut image = Self::random(width, height, rotation);
+        for texel in &mut image.texels {
+            let step = (texel.iter().fold(0.0_f32, |a, &b| a.max(b)).log2().floor() - 7.0).exp2();
+            *texel = texel.map(|x| (x / step).floor() * step);
+        }
+        assert!(image.prepared().rgbe);
+        image
+    }
+
     /// Black but for one texel.
     fn lamp(width: usize, height: usize, at: usize, radiance: f32) -> Self {
         let mut image = Self { texels: vec![[0.0; 3]; width * height], ..Self::random(width, height, 1.0) };
@@ -103,6 +114,9 @@ fn images() -> Vec<Image> {
         Image::random(13, 1, 4.0),
         Image::random(1, 1, 0.5),
         Image::random(64, 33, 0.7),
+        Image::rgbe(16, 8, 2.0),
+        Image::rgbe(1, 3, 1.0),
+        Image::rgbe(5, 1, 0.1),
         Image::lamp(16, 8, 37, 1e9),
         Image::lamp(8, 8, 3, 1e-9),
     ]

@@ -49,6 +49,31 @@ fn material(alpha_mode: AlphaMode, alpha: f32) -> Material {
     Material { alpha_mode, alpha, ..Material::lambertian("sheet", [0.0; 3]) }
 }
 
+/// By the order of its vertices traversal tells a leaf that it must ask about, without a look at the triangles' records.
+#[test]
+fn leaves_with_alpha_begin_with_the_larger_vertex() {
+    let mut scene = scene_of(&[UNIT], &[DAffine3::IDENTITY]);
+    scene.materials.push(material(AlphaMode::Blend, 0.5));
+    let mut random = crate::common::random::Random(5);
+    for index in 0..40 {
+        let [a, b, c, d] = [0; 4].map(|_| [0; 3].map(|_| (random.unit() as f32 * 4.0).floor() - 2.0));
+        let pair = [[0, 1, 2], [0, 2, 3]][..1 + index / 2 % 2].to_vec();
+        scene.meshes[0].primitives.push(Primitive { triangles: pair, ..soup(&[[a, b, c], [d, d, d]], index % 2) });
+        let positions = &mut scene.meshes[0].primitives.last_mut().expect("it was added").positions;
+        positions.truncate(4);
+    }
+    let prepared = prepared(&scene);
+    let words = |vertex: [f32; 3]| vertex.map(f32::to_bits);
+    let mut seen = [0; 4];
+    for number in prepared.triangle_slots(&prepared.meshes[0]) {
+        let (first, alpha) =
+            (prepared.triangle(number & !1), prepared.triangle(number).record.kind & TRIANGLE_ALPHA != 0);
+        assert_eq!(words(first.vertices[0]) > words(first.vertices[2]), alpha, "{first:?}");
+        seen[usize::from(alpha) + 2 * (number & 1) as usize] += 1;
+    }
+    assert!(seen.iter().all(|&count| count > 3), "one or two triangles, with alpha and without: {seen:?}");
+}
+
 const MASK: AlphaMode = AlphaMode::Mask { cutoff: 0.5 };
 
 #[test]

@@ -26,7 +26,14 @@ fn lookup(environment: &PreparedEnvironment, u: f64, v: f64) -> f64 {
     let (x0, y0) = (x.floor(), y.floor());
     let (fx, fy) = (x - x0, y - y0);
     let texel = |x: i64, y: i64| {
-        let texel = environment.array[(y.clamp(0, height - 1) * width + x.rem_euclid(width)) as usize];
+        let (x, y) = (x.rem_euclid(width), y.clamp(0, height - 1));
+        if environment.rgbe {
+            // The first word of the quad below and right of it.
+            let word = environment.array[((y + 1) * width + x) as usize][0];
+            let scale = f64::from((word >> 24) as i32 - 136).exp2();
+            return luminance([0, 8, 16].map(|shift| (f64::from(word >> shift & 255) * scale) as f32));
+        }
+        let texel = environment.array[(y * width + x) as usize];
         luminance([texel[0], texel[1], texel[2]].map(f32::from_bits))
     };
     let (x0, y0) = (x0 as i64, y0 as i64);
@@ -176,8 +183,10 @@ fn black_images_are_no_environment_and_constants_need_no_tables() {
     let white = prepare(&Environment::Constant([1.0; 3]), Importance).unwrap();
     assert_eq!((white.kind, white.array.len()), (EnvironmentKind::Constant, 0));
     assert!((white.pdf_solid_angle(DVec3::Y) - 0.25 / PI).abs() < 1e-15);
-    let uniform = prepare(&image(4, 2, 0.0, |_, _| [1.0; 3]), Uniform).unwrap();
-    assert_eq!((uniform.array.len(), uniform.conditional_word), (8, 0));
+    let uniform = prepare(&image(4, 2, 0.0, |_, _| [0.1; 3]), Uniform).unwrap();
+    assert_eq!((uniform.array.len(), uniform.conditional_word, uniform.rgbe), (8, 0, false));
+    let quads = prepare(&image(4, 2, 0.0, |_, _| [1.0; 3]), Uniform).unwrap();
+    assert_eq!((quads.array.len(), quads.conditional_word, quads.rgbe), (12, 0, true));
 }
 
 /// ∫ tent·sin θ of a row with the shader's clamping, by midpoints.
