@@ -43,11 +43,12 @@ struct LaneState {
     uint has_path;         // 0 between samples
 };
 
-// Tiles of 8×8 pixels are numbered row by row, and so are the pixels inside of each.
-uvec2 pixel_of_tile(RenderConstants constants, uint tile, uint inside) {
-    uint tiles_across = (constants.width + TILE_WIDTH - 1u) / TILE_WIDTH;
-    uvec2 first = uvec2(tile % tiles_across, tile / tiles_across) * TILE_WIDTH;
-    return first + uvec2(inside % TILE_WIDTH, inside / TILE_WIDTH);
+// Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
+uvec2 pixel_of_index(RenderConstants constants, uint index) {
+    uint tiles_across = (constants.width + 7u) / 8u;
+    uint tile = index / 64u;
+    uint inside = index % 64u;
+    return uvec2(tile % tiles_across, tile / tiles_across) * 8u + uvec2(inside % 8u, inside / 8u);
 }
 
 void begin_block(inout LaneState lane) {
@@ -89,12 +90,11 @@ LaneState idle_lane() {
     return lane;
 }
 
-// Gives the lane an atom of the slice, which lies in `tile`; it has no samples if its pixel is outside of the image.
-void begin_atom(inout LaneState lane, RenderConstants constants, SliceConstants slice, uint index, uint tile) {
-    uvec2 tiles = (uvec2(constants.width, constants.height) + TILE_WIDTH - 1u) / TILE_WIDTH;
-    uint pixels = tiles.x * tiles.y * TILE_PIXELS;
+// Gives the lane an atom of the slice; it has no samples if its pixel is outside of the image.
+void begin_atom(inout LaneState lane, RenderConstants constants, SliceConstants slice, uint index) {
+    uint pixels = ((constants.width + 7u) / 8u) * ((constants.height + 7u) / 8u) * 64u;
     uint atom = slice.first_atom + index;
-    uvec2 pixel = pixel_of_tile(constants, tile, atom % TILE_PIXELS);
+    uvec2 pixel = pixel_of_index(constants, atom % pixels);
     uint first = (slice.first_block + atom / pixels) * BLOCK_SAMPLES;
     bool outside = pixel.x >= constants.width || pixel.y >= constants.height;
     lane.atom = index;

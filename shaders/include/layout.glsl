@@ -12,9 +12,6 @@ const uint SLOT_NO_LEAF = 0xff800000u;
 const uint SLOT_GROUP = 4u;
 const uint SLOT_TEXELS = 3u;
 
-const uint TILE_WIDTH = 8u;
-const uint TILE_PIXELS = 64u;
-
 const uint TRIANGLE_LIGHT = 0x80000000u;
 const uint TRIANGLE_ALPHA = 0x40000000u;
 const uint TRIANGLE_COLORS = 0x20000000u;

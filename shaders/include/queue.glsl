@@ -42,8 +42,7 @@ bool take_atom(inout LaneState lane) {
         rounds += 1u;
         uint atom = atomicAdd(queue.taken, 1u);
         if (atom >= slice.atoms) break;
-        uint tile = slice_tiles[(slice.first_atom % TILE_PIXELS + atom) / TILE_PIXELS];
-        begin_atom(lane, constants, slice, atom, tile);
+        begin_atom(lane, constants, slice, atom);
         if (HAS_EXTRAS) begin_extras();
         if (lane.sample_index < lane.end_sample) return true;
         finish_atom(lane);

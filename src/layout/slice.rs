@@ -2,14 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// Width and height of a tile, in pixels.
-pub const TILE_WIDTH: u32 = 8;
-/// Pixels of a tile.
-pub const TILE_PIXELS: u32 = 64;
-
-/// What a slice renders: the atoms `0..atoms`, atom i being block `first_block` + a / pixels of the pixel at place a mod
-/// pixels with a = `first_atom` + i. Places are those of tiles in the order in which they are rendered, and row by row within.
-/// Lanes `0..lanes` take the atoms from a [`SliceQueue`].
+/// What a slice renders: the atoms `0..atoms`, atom i being block `first_block` + a / pixels of pixel a mod pixels with
+/// a = `first_atom` + i. Lanes `0..lanes` take them from a [`SliceQueue`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct SliceConstants {

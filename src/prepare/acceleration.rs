@@ -15,8 +15,6 @@ use crate::layout::{InstanceRecord, InstanceSlot, SLOT_INSTANCE, TRIANGLE_INDEX_
 
 /// A shared mesh's tree covers itself with this many boxes: rotated, they bound an instance tighter than one would.
 const COVER_BOXES: usize = 64;
-/// So many boxes cover the scene as the film shows it.
-const WORLD_COVER_BOXES: usize = 4096;
 
 /// The slots and what stands in them.
 #[derive(Debug)]
@@ -36,8 +34,6 @@ pub(super) struct Acceleration {
     pub(super) instance_bounds: Vec<Bounds>,
     /// Box of everything.
     pub(super) bounds: Bounds,
-    /// Boxes that together contain everything.
-    pub(super) cover: Vec<Bounds>,
 }
 
 impl Acceleration {
@@ -51,7 +47,6 @@ impl Acceleration {
             instance_sources: Vec::new(),
             instance_bounds: Vec::new(),
             bounds: Bounds::EMPTY,
-            cover: Vec::new(),
         }
     }
 }
@@ -73,7 +68,6 @@ pub(super) fn build(
     primitives.extend((first_instance..).zip(&acceleration.instance_bounds).map(|(i, b)| Primitive::new(i, b)));
     let tree = kept.tree(primitives, quality);
     acceleration.bounds = tree.bounds();
-    acceleration.cover = tree.cover(WORLD_COVER_BOXES);
     append(&mut acceleration, &tree, &mut geometry.world)?;
     for (tree, mesh) in trees.iter().zip(&mut geometry.shared) {
         append(&mut acceleration, tree, &mut mesh.geometry)?;

@@ -167,8 +167,6 @@ pub struct Prepared {
     pub meshes: Vec<PreparedMesh>,
     /// Placements of the shared meshes.
     pub instances: Vec<PreparedInstance>,
-    /// Boxes in rebased space that together contain all triangles.
-    pub cover: Vec<bounds::Bounds>,
     /// Figures for people.
     pub statistics: Statistics,
 }
@@ -259,14 +257,13 @@ pub fn prepare_again(scene: &Scene, options: &PrepareOptions, kept: &Kept) -> Re
     let mut statistics = pack::statistics(&acceleration, &lights);
     let instances = pack::prepared_instances(&acceleration);
     let meshes = std::mem::take(&mut acceleration.meshes);
-    let cover = std::mem::take(&mut acceleration.cover);
     let origin = geometry.origin;
     let (arrays, constants) =
         pack::pack_arrays(geometry, acceleration, &materials, textures, environment, &lights, &features);
     statistics.array_bytes = [0, 1, 2, 3, 4].map(|i: usize| (arrays[i].len() * size_of::<Texel>()) as u64);
     statistics.bvh_seconds = bvh_seconds;
     statistics.seconds = start.elapsed().as_secs_f64();
-    Ok(Prepared { origin, arrays, constants, features, meshes, instances, cover, statistics })
+    Ok(Prepared { origin, arrays, constants, features, meshes, instances, statistics })
 }
 
 /// Luminance of linear Rec.709 RGB.

@@ -128,7 +128,6 @@ pub(super) fn with_sets<T>(
             set.push((5, BindingResource::Storage(slice.aovs.as_ref().unwrap_or(&slice.results))));
             set.push((6, BindingResource::Storage(slice.counters.as_ref().unwrap_or(&slice.results))));
             set.push((7, BindingResource::Storage(&slice.queue)));
-            set.push((8, BindingResource::Storage(&slice.tiles)));
             set
         })
         .collect();

@@ -18,7 +18,6 @@ mod schedule;
 mod settings;
 mod slices;
 mod statistics;
-mod tile_order;
 
 use std::ops::ControlFlow;
 use std::time::Instant;

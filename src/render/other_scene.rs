@@ -8,12 +8,10 @@ use super::bake::BakeReport;
 use super::kernel_build::{BindingOverride, baked_spirv, scene_constants, with_sets};
 use super::kernel_key::KernelKey;
 use super::scene_buffers::{SceneBuffers, choose_array_form};
-use super::tile_order::TileOrder;
 use super::{PathTracer, Settings};
 use crate::Result;
 use crate::layout::RenderConstants;
 use crate::prepare::Prepared;
-use crate::prepare::bounds::Bounds;
 use crate::scene::Camera;
 
 /// A scene on the device of a tracer, whose kernel is the one that it takes.
@@ -21,7 +19,6 @@ pub struct OtherScene {
     pub(super) buffers: Arc<SceneBuffers>,
     pub(super) constants: RenderConstants,
     pub(super) origin: DVec3,
-    pub(super) cover: Vec<Bounds>,
     pub(super) bake: BakeReport,
 }
 
@@ -47,8 +44,7 @@ impl OtherScene {
         }
         let buffers = Arc::new(SceneBuffers::upload(&beside.gpu, prepared, beside.trace, form)?);
         let constants = scene_constants(prepared, camera, settings);
-        let cover = prepared.cover.clone();
-        Ok(Some(Self { buffers, constants, origin: prepared.origin, cover, bake }))
+        Ok(Some(Self { buffers, constants, origin: prepared.origin, bake }))
     }
 }
 
@@ -62,8 +58,6 @@ impl PathTracer {
         with_sets(&self.key, &other.buffers, &self.constants_buffer, &self.slices, |sets| kernel.rebind(sets))?;
         self.constants = other.constants;
         self.origin = other.origin;
-        self.order = TileOrder::new(&self.constants, &other.cover);
-        self.cover = other.cover;
         self.buffers = other.buffers;
         self.bake = other.bake;
         self.forget_sizes();

@@ -18,12 +18,10 @@ use super::run::{Limits, SliceResults};
 use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
-use super::tile_order::TileOrder;
 use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
 use crate::gpu::{Buffer, Gpu, Kernel, MemoryUse, TraceBackend};
 use crate::layout::RenderConstants;
-use crate::prepare::bounds::Bounds;
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
@@ -35,9 +33,6 @@ pub struct PathTracer {
     pub(super) constants: RenderConstants,
     /// Where rebased space has its zero.
     pub(super) origin: DVec3,
-    /// Boxes that together contain the scene.
-    pub(super) cover: Vec<Bounds>,
-    pub(super) order: TileOrder,
     pub(super) constants_buffer: Buffer,
     pub(super) slices: Vec<Slice>,
     pub(super) sizes: SliceSizes,
@@ -133,8 +128,6 @@ impl PathTracer {
             kernel,
             constants,
             origin: prepared.origin,
-            order: TileOrder::new(&constants, &prepared.cover),
-            cover: prepared.cover.clone(),
             constants_buffer,
             slices,
             sizes,
@@ -198,7 +191,6 @@ impl PathTracer {
     /// Looks through another camera of the same kind (lens, projection), on a film of another size.
     pub fn look_through(&mut self, camera: &Camera, origin: DVec3, width: u32, height: u32) {
         camera_constants(camera, origin, width, height, &mut self.constants);
-        self.order = TileOrder::new(&self.constants, &self.cover);
     }
 
     /// Bytes of device memory in use.
@@ -271,7 +263,7 @@ impl PathTracer {
     ) -> Result<()> {
         self.constants_buffer.write(&[self.constants])?;
         self.sizes.begin(self.constants.end_sample - self.constants.first_sample);
-        let mut schedule = Schedule::new(&self.constants, &self.order);
+        let mut schedule = Schedule::new(&self.constants);
         let mut in_flight = VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
         let mut last_end = Instant::now();
@@ -283,7 +275,7 @@ impl PathTracer {
                 let Some(slot) = free.pop() else { break };
                 let constants =
                     schedule.next(self.sizes.next_atoms(), self.slices[slot].lanes(), self.sizes.ray_budget());
-                self.slices[slot].submit(&self.kernel, slot, constants, &self.order)?;
+                self.slices[slot].submit(&self.kernel, slot, constants)?;
                 in_flight.push_back(slot);
             }
             // In the order of submission, so that a pixel's blocks are joined by their index.
@@ -297,7 +289,7 @@ impl PathTracer {
                 aovs: slice.aovs(atoms)?,
                 counters: slice.counters(atoms)?,
             };
-            run.add(&self.order, &outcome, &brought, self.origin);
+            run.add(&self.constants, &outcome, &brought, self.origin);
             free.push(slot);
             let update = ProgressUpdate {
                 samples_done: run.paths,

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::path_tracer::PathTracer;
+use super::schedule::index_of_pixel;
 use crate::Result;
 use crate::layout::{BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, SliceConstants};
 
@@ -25,7 +26,7 @@ impl PathTracer {
         (self.constants.seed, self.constants.first_sample, self.constants.end_sample) = (seed, sample, sample + 1);
         self.constants_buffer.write(&[self.constants])?;
         let push = SliceConstants {
-            first_atom: self.order.place(x, y),
+            first_atom: index_of_pixel(&self.constants, x, y),
             lanes: 1,
             atoms: 1,
             first_block: sample / BLOCK_SAMPLES,
@@ -34,7 +35,7 @@ impl PathTracer {
             prints: 1,
             ..SliceConstants::default()
         };
-        self.slices[0].submit(&self.kernel, 0, push, &self.order)?;
+        self.slices[0].submit(&self.kernel, 0, push)?;
         self.slices[0].finish(&self.kernel, 0, Instant::now())?;
         let records = self.slices[0].results(2 + DEBUG_RECORDS)?;
         Ok(decode(&records[1..]))

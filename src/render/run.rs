@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
 
+use super::schedule::{padded_pixels, pixel_of_index};
 use super::slices::SliceOutcome;
-use super::tile_order::TileOrder;
 use super::{KernelKey, NonFiniteSample, Settings, Statistics, StopReason};
 use crate::film::Film;
 use crate::film::aov::{AovFilm, AovSample};
@@ -111,8 +111,14 @@ impl Run {
     }
 
     /// What a slice has brought. `origin` is the world's point at which rebased space has its zero.
-    pub(super) fn add(&mut self, order: &TileOrder, outcome: &SliceOutcome, slice: &SliceResults<'_>, origin: DVec3) {
-        let pixels = order.pixels();
+    pub(super) fn add(
+        &mut self,
+        constants: &RenderConstants,
+        outcome: &SliceOutcome,
+        slice: &SliceResults<'_>,
+        origin: DVec3,
+    ) {
+        let pixels = padded_pixels(constants);
         if let (Some(statistics), Some(counters)) = (&mut self.statistics, slice.counters) {
             statistics.add(outcome, counters);
         }
@@ -121,9 +127,9 @@ impl Run {
                 continue;
             }
             let atom = u64::from(outcome.constants.first_atom) + index as u64;
-            let (x, y) = order.pixel(atom % pixels);
+            let (x, y) = pixel_of_index(constants, atom % pixels);
             let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
-            let pixel = y as usize * self.film.width() as usize + x as usize;
+            let pixel = y as usize * constants.width as usize + x as usize;
             let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
             self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples());
             if let (Some(film), Some(aovs)) = (&mut self.aovs, slice.aovs) {

@@ -9,12 +9,10 @@ use ash::vk::BufferUsageFlags as Usage;
 
 use super::kernel_build::BindingOverride;
 use super::kernel_key::KernelKey;
-use super::tile_order::TileOrder;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
 use crate::layout::{
     AovSums, BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue,
-    TILE_PIXELS,
 };
 
 /// Slices that are submitted before the oldest is read.
@@ -34,8 +32,6 @@ pub(super) struct Slice {
     pub(super) results: Buffer,
     pub(super) lane_states: Buffer,
     pub(super) queue: Buffer,
-    /// The tiles in which its atoms lie, in their order.
-    pub(super) tiles: Buffer,
     /// [`AovSums`] an atom, if the kernel sums AOVs.
     pub(super) aovs: Option<Buffer>,
     /// [`RayCounters`] an atom, if it counts.
@@ -84,14 +80,6 @@ impl Slice {
                 Usage::STORAGE_BUFFER | Usage::TRANSFER_DST,
                 MemoryUse::Readback,
             )?,
-            // The first and the last may be begun and not ended.
-            tiles: Buffer::new(
-                gpu,
-                "slice tiles",
-                (u64::from(atoms) / u64::from(TILE_PIXELS) + 2) * size_of::<u32>() as u64,
-                Usage::STORAGE_BUFFER,
-                MemoryUse::Upload,
-            )?,
             submission: Submission::new(gpu, "path_trace")?,
             constants: SliceConstants::default(),
             submitted: Instant::now(),
@@ -112,18 +100,11 @@ impl Slice {
 
     pub(super) fn bytes(&self) -> u64 {
         let extras = [&self.aovs, &self.counters].into_iter().flatten().map(|buffer| buffer.size).sum::<u64>();
-        self.results.size + self.lane_states.size + self.queue.size + self.tiles.size + extras
+        self.results.size + self.lane_states.size + self.queue.size + extras
     }
 
-    pub(super) fn submit(
-        &mut self,
-        kernel: &Kernel,
-        set: usize,
-        constants: SliceConstants,
-        order: &TileOrder,
-    ) -> Result<()> {
+    pub(super) fn submit(&mut self, kernel: &Kernel, set: usize, constants: SliceConstants) -> Result<()> {
         self.constants = constants;
-        self.tiles.write(&order.tiles_from(constants.first_atom, constants.atoms).collect::<Vec<_>>())?;
         self.submitted = Instant::now();
         self.dispatch(kernel, set)
     }

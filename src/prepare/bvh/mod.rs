@@ -12,8 +12,6 @@ pub use quantise::{decode, inner_slot, is_present};
 pub use validate::{TreeContents, validate};
 pub use wide::{Appended, GROUP_BITS, Slot, empty_slot, triangles_in};
 
-use std::collections::BinaryHeap;
-
 use super::PrepareError;
 use super::bounds::Bounds;
 use crate::named_enum::named_enum;
@@ -66,23 +64,17 @@ impl Tree {
 
     /// At most `count` boxes that together contain everything: a tighter hull than one box once it is rotated.
     pub fn cover(&self, count: usize) -> Vec<Bounds> {
-        let mut leaves = Vec::new();
-        // By area; areas are not negative, so that their bits are in their order.
-        let mut open = BinaryHeap::new();
-        let mut put = |node: usize, open: &mut BinaryHeap<_>| match &self.nodes[node] {
-            leaf if leaf.is_leaf() => leaves.push(leaf.bounds()),
-            inner => open.push((inner.half_area().to_bits(), node)),
-        };
-        if !self.nodes.is_empty() {
-            put(0, &mut open);
+        let mut open: Vec<usize> = if self.nodes.is_empty() { vec![] } else { vec![0] };
+        while open.len() < count {
+            let largest = (0..open.len())
+                .filter(|&i| !self.nodes[open[i]].is_leaf())
+                .max_by(|&a, &b| self.nodes[open[a]].half_area().total_cmp(&self.nodes[open[b]].half_area()));
+            let Some(largest) = largest else { break };
+            let node = open[largest];
+            open[largest] = node + 1;
+            open.push(node + self.nodes[node].right_or_primitive as usize);
         }
-        for _ in 1..count {
-            let Some((_, node)) = open.pop() else { break };
-            put(node + 1, &mut open);
-            put(node + self.nodes[node].right_or_primitive as usize, &mut open);
-        }
-        leaves.extend(open.into_iter().map(|(_, node)| self.nodes[node].bounds()));
-        leaves
+        open.iter().map(|&node| self.nodes[node].bounds()).collect()
     }
 
     /// Appends the tree to `slots` as four-wide nodes: a group that holds only the root, which is always an inner slot,
