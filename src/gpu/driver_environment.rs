@@ -5,7 +5,7 @@
 //! has to win back from the second. So the width follows the number of paths. An image does not depend on it, bit for bit
 //! (tests/cli/driver_environment.rs): a lane does the same IEEE operations whatever lies beside it. Mesa's shader cache
 //! does not know the width a kernel was compiled for, so each width has a folder of its own (`MESA_SHADER_CACHE_DIR`).
-//! What the user has set is left as it is. Measured with Mesa 22.3 and 25.0: docs/benchmarks, "Cold starts".
+//! What the user has set is left as it is, but that their folder gets one for each width. Measured with Mesa 22.3 and 25.0: docs/benchmarks, "Cold starts".
 
 use std::ffi::{OsStr, OsString};
 use std::fmt;
@@ -112,7 +112,7 @@ impl Circumstances {
         let [width, cache, optimisation] = [WIDTH_VARIABLE, CACHE_VARIABLE, OPTIMISATION_VARIABLE].map(variable);
         // Reading the drivers takes milliseconds, which are spent only where the answer matters.
         let has_avx512 = has_avx512();
-        let asks = cache.is_none() && width.is_none() && (has_avx512 || is_short(paths));
+        let asks = width.is_none() && (has_avx512 || is_short(paths));
         let lavapipes = if asks { lavapipe_versions() } else { Vec::new() };
         Self { width, cache, optimisation, has_avx512, lavapipes, cache_folder: cache_folder(), paths }
     }
@@ -135,13 +135,15 @@ fn is_short(paths: Option<u64>) -> bool {
 }
 
 fn choose(around: &Circumstances) -> DriverEnvironment {
-    if around.cache.is_some() {
-        return DriverEnvironment::nothing(format!("{CACHE_VARIABLE} is set"));
-    }
-    let Some(folder) = &around.cache_folder else {
-        return DriverEnvironment::nothing("there is no folder for a shader cache");
+    let folder = match (&around.cache, &around.cache_folder) {
+        (Some(_), _) if around.width.is_some() => {
+            return DriverEnvironment::nothing(format!("{CACHE_VARIABLE} and {WIDTH_VARIABLE} are set"));
+        }
+        (Some(folder), _) => PathBuf::from(folder),
+        (None, Some(folder)) => folder.join("mesa-shader-cache"),
+        (None, None) => return DriverEnvironment::nothing("there is no folder for a shader cache"),
     };
-    let cache = |width: &OsStr| (CACHE_VARIABLE, folder.join("mesa-shader-cache").join(width).into_os_string());
+    let cache = |width: &OsStr| (CACHE_VARIABLE, folder.join(width).into_os_string());
     if let Some(width) = &around.width {
         let reason = format!("{WIDTH_VARIABLE} is set, and Mesa's shader cache does not know the width");
         return DriverEnvironment { set: vec![cache(width)], reason };
@@ -236,7 +238,11 @@ mod tests {
 
     #[test]
     fn what_the_user_has_set_stays() {
-        assert_eq!(choose(&Circumstances { cache: Some("/mine".into()), ..around() }).set, []);
+        let both = Circumstances { cache: Some("/mine".into()), width: Some("256".into()), ..around() };
+        assert_eq!(choose(&both).set, []);
+        let chosen = choose(&Circumstances { width: None, ..both });
+        let folder = Path::new("/mine/512").into();
+        assert_eq!(chosen.set, [(WIDTH_VARIABLE, "512".into()), (CACHE_VARIABLE, folder)], "a folder in theirs");
         let chosen = choose(&Circumstances { width: Some("128".into()), ..around() });
         let folder = Path::new("/cache/sunfleck/mesa-shader-cache/128").into();
         assert_eq!(chosen.set, [(CACHE_VARIABLE, folder)], "a cache for that width");
