@@ -24,7 +24,8 @@ float surface_opacity(RenderConstants constants, Material material, Vertices ver
 }
 
 // Whether the ray of `key` meets the triangle, with the probability of its opacity.
-bool alpha_hits(RenderConstants constants, uvec2 key, uint material, uint triangle, uint instance, vec2 barycentric) {
+bool alpha_hits(RenderConstants constants, uvec2 key, uint triangle, uint instance, vec2 barycentric) {
+    uint material = triangle_look(constants, load_triangle_kind(constants, triangle), instance).material;
     Vertices vertices = interpolate_vertices(constants, triangle, instance, barycentric);
     float opacity = surface_opacity(constants, load_material(constants, material), vertices);
     return to_unit(pcg4d(uvec4(key, triangle, instance)).x) < opacity;

@@ -53,8 +53,13 @@ vec3 rgbe_radiance(uint word) {
     return vec3(word & 255u, (word >> 8u) & 255u, (word >> 16u) & 255u) * uintBitsToFloat(((word >> 24u) - 9u) << 23u);
 }
 
-// The same as below from quads: one element holds the four texels, another their probabilities.
-vec4 environment_interpolate_quads(RenderConstants constants, ivec2 corner, vec2 low, vec2 high) {
+// The texels (x, y), (x + 1, y), (x, y + 1) and (x + 1, y + 1) from `corner` on. Of quads, one element holds all four, and
+// another their probabilities.
+mat4 environment_texels(RenderConstants constants, ivec2 corner) {
+    if (!environment_is_rgbe(constants))
+        return mat4(environment_texel(constants, corner.x, corner.y), environment_texel(constants, corner.x + 1, corner.y),
+                    environment_texel(constants, corner.x, corner.y + 1),
+                    environment_texel(constants, corner.x + 1, corner.y + 1));
     int width = int(constants.environment_width);
     int height = int(constants.environment_height);
     int x = corner.x < 0 ? corner.x + width : corner.x;
@@ -62,20 +67,17 @@ vec4 environment_interpolate_quads(RenderConstants constants, ivec2 corner, vec2
     uvec4 words = LOAD4(ENVIRONMENT, quad);
     vec4 p = vec4(0.0);
     if (environment_is_sampled_by_texels()) p = uintBitsToFloat(LOAD4(ENVIRONMENT, quad + uint(width * (height + 1))));
-    vec4 top = vec4(rgbe_radiance(words.x), p.x) * low.x + vec4(rgbe_radiance(words.y), p.y) * high.x;
-    vec4 bottom = vec4(rgbe_radiance(words.z), p.z) * low.x + vec4(rgbe_radiance(words.w), p.w) * high.x;
-    return (top * low.y + bottom * high.y) * vec4(constants.environment_radiance, 1.0);
+    return mat4(vec4(rgbe_radiance(words.x), p.x), vec4(rgbe_radiance(words.y), p.y), vec4(rgbe_radiance(words.z), p.z),
+                vec4(rgbe_radiance(words.w), p.w));
 }
 
 // The four texels from `corner` on, weighted by those of its column and row (`low`) and of the next ones (`high`). All
 // terms are positive, so the sum is good to 6 roundings also where a texel of 10⁹ fades out: radiance and density are
 // as exact as each other.
 vec4 environment_interpolate(RenderConstants constants, ivec2 corner, vec2 low, vec2 high) {
-    if (environment_is_rgbe(constants)) return environment_interpolate_quads(constants, corner, low, high);
-    vec4 top = environment_texel(constants, corner.x, corner.y) * low.x +
-               environment_texel(constants, corner.x + 1, corner.y) * high.x;
-    vec4 bottom = environment_texel(constants, corner.x, corner.y + 1) * low.x +
-                  environment_texel(constants, corner.x + 1, corner.y + 1) * high.x;
+    mat4 texels = environment_texels(constants, corner);
+    vec4 top = texels[0] * low.x + texels[1] * high.x;
+    vec4 bottom = texels[2] * low.x + texels[3] * high.x;
     return (top * low.y + bottom * high.y) * vec4(constants.environment_radiance, 1.0);
 }
 

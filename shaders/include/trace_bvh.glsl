@@ -299,9 +299,8 @@ void answer(inout Trace trace, RenderConstants constants) {
     trace.first = number + 1u;
     TriangleVertices v = load_triangle(number);
     TriangleMeeting meeting = meet_triangle(trace.space, trace.origin, v.a, v.b, v.c);
-    TriangleLook look = triangle_look(constants, load_triangle_kind(constants, number), trace.instance);
-    if (!alpha_hits(constants, trace.alpha_key, look.material, number, trace.instance, meeting.scaled / meeting.determinant))
-        return;
+    vec2 barycentric = meeting.scaled / meeting.determinant;
+    if (!alpha_hits(constants, trace.alpha_key, number, trace.instance, barycentric)) return;
     trace.hit = Hit(TriangleId(number, trace.instance), meeting.t, meeting.scaled);
     trace.determinant = meeting.determinant;
     if (trace.any_hit) trace.current = NONE;

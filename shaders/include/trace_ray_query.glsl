@@ -35,13 +35,6 @@ TriangleId query_triangle(RenderConstants constants, uint custom, uint primitive
     return TriangleId(2u * first + primitive, baked ? NONE : custom);
 }
 
-// Whether the ray meets the candidate. Only triangles of surfaces with alpha are candidates; the others are opaque
-// geometry, which the driver commits by itself.
-bool candidate_hits(RenderConstants constants, uvec2 key, TriangleId triangle, vec2 barycentric) {
-    TriangleLook look = triangle_look(constants, load_triangle_kind(constants, triangle.slot), triangle.instance);
-    return alpha_hits(constants, key, look.material, triangle.slot, triangle.instance, barycentric);
-}
-
 // The rounds of a software driver's own loops, for a large scene; a driver does not tell.
 uint trace_advance_rounds() { return 256u; }
 
@@ -52,12 +45,14 @@ void trace_advance(inout Trace trace, RenderConstants constants) {
     rayQueryEXT query;
     rayQueryInitializeEXT(query, top_level, flags, 0xffu, trace.ray.origin, trace.t_min, trace.ray.direction,
                           trace.ray.t_max);
+    // Only triangles of surfaces with alpha are candidates; the others are opaque geometry, which the driver commits by itself.
     while (rayQueryProceedEXT(query)) {
         if (!HAS_ALPHA) continue;
         TriangleId candidate =
             query_triangle(constants, uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false)),
                            uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false)));
-        if (candidate_hits(constants, trace.alpha_key, candidate, rayQueryGetIntersectionBarycentricsEXT(query, false)))
+        vec2 barycentric = rayQueryGetIntersectionBarycentricsEXT(query, false);
+        if (alpha_hits(constants, trace.alpha_key, candidate.slot, candidate.instance, barycentric))
             rayQueryConfirmIntersectionEXT(query);
     }
     trace.done = true;

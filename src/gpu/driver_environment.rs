@@ -5,7 +5,8 @@
 //! has to win back from the second. So the width follows the number of paths. An image does not depend on it, bit for bit
 //! (tests/cli/driver_environment.rs): a lane does the same IEEE operations whatever lies beside it. Mesa's shader cache
 //! does not know the width a kernel was compiled for, so each width has a folder of its own (`MESA_SHADER_CACHE_DIR`).
-//! What the user has set is left as it is, but that their folder gets one for each width. Measured with Mesa 22.3 and 25.0: docs/benchmarks, "Cold starts".
+//! What the user has set is left as it is, but that their folder gets one for each width. Measured with Mesa 22.3 and 25.0:
+//! docs/benchmarks, "Cold starts".
 
 use std::ffi::{OsStr, OsString};
 use std::fmt;

@@ -116,6 +116,7 @@ impl MaterialTable {
     /// Adds what the materials need.
     pub(super) fn add_features(&self, textures: &TextureTable<'_>, features: &mut Features) {
         features.mip = textures.headers.iter().any(|header| header.sampling & TEXTURE_MIPS != 0);
+        features.alpha = self.has_alpha;
         for record in &self.records {
             features.bsdfs |= 1 << (record.kind_flags & MATERIAL_KIND_MASK);
             features.textures |= textures_of(record).iter().any(|&texture| texture != NONE);
@@ -128,7 +129,6 @@ impl MaterialTable {
             features.panes |= record.transmission > 0.0 && !solid && record.roughness.powi(2) < SMALLEST_ALPHA;
             features.specular |= has_specular(record);
             features.anisotropy |= record.anisotropy > 0.0;
-            features.alpha |= record.kind_flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0;
             features.black_back |= record.kind_flags & MATERIAL_BLACK_BACK != 0;
             features.schlick |= record.kind_flags & MATERIAL_SCHLICK != 0;
         }

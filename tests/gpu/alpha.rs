@@ -75,6 +75,11 @@ fn stack(layers: u32, alpha: f32, instanced: bool) -> Scene {
     scene
 }
 
+/// What is seen where sheets let this share of the background through.
+fn mix(channel: usize, through: f64) -> f64 {
+    f64::from(SHEET[channel]) * (1.0 - through) + f64::from(BACKGROUND[channel]) * through
+}
+
 /// n sheets of alpha a let (1 − a)ⁿ of the background through, whichever of them the ray meets first.
 #[test]
 fn sheets_mix_with_the_background() {
@@ -82,9 +87,6 @@ fn sheets_mix_with_the_background() {
     for (layers, alpha, instanced) in cases {
         let means = image_mean(&stack(layers, alpha, instanced), &settings(0));
         let through = |alpha: f64| (1.0 - alpha).powi(layers as i32);
-        let mix = |channel: usize, through: f64| {
-            f64::from(SHEET[channel]) * (1.0 - through) + f64::from(BACKGROUND[channel]) * through
-        };
         for (channel, mean) in means.iter().enumerate() {
             let what = format!("{layers} sheets of alpha {alpha}, instances {instanced}, channel {channel}");
             let (exact, wrong) = (through(alpha.into()), through(f64::from(alpha) - 0.02));
@@ -103,14 +105,12 @@ fn both_triangles_of_a_folded_leaf_are_asked() {
     };
     let alpha = 0.3;
     for towards in [1.0, -1.0] {
-        let mut scene = Scene { meshes: stack(1, alpha, false).meshes, ..stack(1, alpha, false) };
+        let mut scene = stack(1, alpha, false);
         scene.meshes[0].primitives = vec![fold(towards)];
         let means = image_mean(&scene, &settings(0));
         for (channel, mean) in means.iter().enumerate() {
-            let mix =
-                |through: f64| f64::from(SHEET[channel]) * (1.0 - through) + f64::from(BACKGROUND[channel]) * through;
-            let through = (1.0 - f64::from(alpha)).powi(2);
-            assert_is(&format!("fold {towards}, {channel}"), mean, mix(through), mix(1.0 - f64::from(alpha)), 6);
+            let (both, one) = ((1.0 - f64::from(alpha)).powi(2), 1.0 - f64::from(alpha));
+            assert_is(&format!("fold {towards}, {channel}"), mean, mix(channel, both), mix(channel, one), 6);
         }
     }
 }
