@@ -406,6 +406,7 @@ void render(inout LaneState lane) {
 void render_baked(inout LaneState lane) {
     while (true) {
         rounds += shading_rounds() + 4u;
+        store_kept_result_in_turn();
         if (!next_ray(lane)) break;
         Found found = find_nearest(constants, lane.ray);
         count_ray_of(lane);
@@ -443,6 +444,7 @@ void main() {
 #ifdef DEBUG_PRINTS
     if (slice.prints != 0u) debug_end();
 #endif
+    if (BAKES_GEOMETRY) store_kept_result();
     count_finished_atoms();
     // A lane without an atom has no state.
     if (lane.atom == NONE) lanes[index].atom = NONE;

@@ -12,6 +12,17 @@ const uint ROUNDS_FOR_RAYS = 32000u;
 
 uint finished_atoms = 0u;  // of the lane, in this dispatch
 
+// The result of an atom that the lane has finished and not stored yet. lavapipe stores every word lane by lane, for all lanes
+// whenever one has something to store, which is dear beside the paths of a scene that is compiled in: there a lane keeps its
+// result until the others of its vector have theirs, in most cases.
+BlockResult kept_result;
+uint kept_atom = NONE;
+uint turns_kept = 0u;
+
+// Turns of the loop of a kernel with the scene compiled in for each sample of an atom, between two looks at what lanes keep.
+// Lanes that run together have the same count, so they store together.
+const uint TURNS_PER_SAMPLE = 4u;
+
 void begin_extras() {
     if (HAS_AOVS) begin_aovs();
     if (HAS_STATISTICS) begin_counters();
@@ -30,8 +41,25 @@ void load_extras(uint atom) {
     if (HAS_STATISTICS) counters = block_counters[atom];
 }
 
+void store_kept_result() {
+    if (kept_atom == NONE) return;
+    results[kept_atom] = kept_result;
+    kept_atom = NONE;
+}
+
+// In every turn of the loop.
+void store_kept_result_in_turn() {
+    turns_kept += 1u;
+    if (turns_kept < TURNS_PER_SAMPLE * min(BLOCK_SAMPLES, constants.end_sample - constants.first_sample)) return;
+    turns_kept = 0u;
+    store_kept_result();
+}
+
 void finish_atom(LaneState lane) {
-    results[lane.atom] = block_result(lane);
+    store_kept_result();
+    kept_result = block_result(lane);
+    kept_atom = lane.atom;
+    if (!BAKES_GEOMETRY) store_kept_result();
     if (HAS_EXTRAS) store_extras(lane.atom);
     finished_atoms += 1u;
 }
