@@ -16,7 +16,8 @@
 const float BAKED_GRAZING = 0.000244140625;
 
 // Ray space (watertight.glsl) as two rows that map what is relative to the origin. Of each row one component is 1 and one
-// 0, so a row times a vector has the two roundings of meet_triangle: no test differs from the other form's.
+// 0, so a row times a vector has the two roundings of meet_triangle: no test differs from the other form's. The vectors begin
+// at a vertex and end at the origin; where that does not cancel, in the third row, the sign is turned.
 struct BakedRay {
     vec3 row_x;
     vec3 row_y;
@@ -32,7 +33,7 @@ BakedRay baked_ray(Ray ray) {
     BakedRay b;
     b.row_x = space.axis == 0u ? vec3(x, 1.0, 0.0) : (space.axis == 1u ? vec3(0.0, x, 1.0) : vec3(1.0, 0.0, x));
     b.row_y = space.axis == 0u ? vec3(y, 0.0, 1.0) : (space.axis == 1u ? vec3(1.0, y, 0.0) : vec3(0.0, 1.0, y));
-    float z = space.shear.z;
+    float z = -space.shear.z;
     b.row_z = space.axis == 0u ? vec3(z, 0.0, 0.0) : (space.axis == 1u ? vec3(0.0, z, 0.0) : vec3(0.0, 0.0, z));
     b.t_max = ray_is_valid(ray) ? ray.t_max : 0.0;
     b.grazing = sqr(max_component(abs(ray.direction)) * BAKED_GRAZING);

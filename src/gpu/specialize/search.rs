@@ -50,15 +50,16 @@ impl RayIds {
         Some(Self { origin, direction, row_x, row_y, row_z, t_max, zero, grazing, excluded })
     }
 
-    /// A vertex relative to the origin.
+    /// The origin relative to a vertex. The other way round the literal would be the first operand of a subtraction, which
+    /// processors do not take from memory.
     fn relative(&self, code: &mut Code<'_>, vertex: [f32; 3]) -> [u32; 3] {
         [0, 1, 2].map(|i| {
             let coordinate = code.constant_float(vertex[i]);
-            code.float(op::F_SUB, &[coordinate, self.origin[i]])
+            code.float(op::F_SUB, &[self.origin[i], coordinate])
         })
     }
 
-    /// A vertex in ray space.
+    /// A vertex in ray space, with the other sign: products of two coordinates do not change.
     fn project(&self, code: &mut Code<'_>, vertex: [f32; 3]) -> [u32; 2] {
         [self.row_x, self.row_y].map(|row| self.along_row(code, row, vertex))
     }
@@ -68,6 +69,15 @@ impl RayIds {
         let products = [0, 1, 2].map(|i| code.float(op::F_MUL, &[row[i], relative[i]]));
         let sum = code.float(op::F_ADD, &[products[0], products[1]]);
         code.float(op::F_ADD, &[sum, products[2]])
+    }
+
+    /// All of a triangle's vertices at once, so that what they are made of need not be kept for its distance.
+    fn prepare(&self, code: &mut Code<'_>, triangle: &BakedTriangle) {
+        for vertex in triangle.vertices {
+            for row in [self.row_x, self.row_y, self.row_z] {
+                self.along_row(code, row, vertex);
+            }
+        }
     }
 
     /// The edge function of two vertices, and whether it stands with the other sign: of the two directions of an edge the
@@ -132,8 +142,9 @@ impl RayIds {
         })
     }
 
-    /// The distance to a face as a fraction: of the height over the speed along the normal for a plane of two triangles; of
-    /// one triangle, interpolated by the edge functions between the distances of its vertices.
+    /// The distance to a face as a fraction. For a plane of two triangles, of the origin's height above it over the speed along
+    /// the normal, whose ratio is the distance with the other sign; of one triangle, interpolated by the edge functions between
+    /// the distances of its vertices.
     fn distance(&self, code: &mut Code<'_>, face: &Face) -> [u32; 2] {
         let [a, b, c] = face.triangles[0].vertices;
         if face.triangles.len() > 1 {
@@ -151,23 +162,28 @@ impl RayIds {
         if face.triangles.len() == 1 {
             return code.float(op::F_DIV, &[numerator, denominator]);
         }
-        let one = code.constant_float(1.0);
-        let inverse = code.float(op::F_DIV, &[one, denominator]);
+        let minus_one = code.constant_float(-1.0);
+        let inverse = code.float(op::F_DIV, &[minus_one, denominator]);
         code.float(op::F_MUL, &[numerator, inverse])
     }
 
     /// Whether a distance lies between 0 and `t_max`, without dividing.
-    fn is_within(&self, code: &mut Code<'_>, numerator: u32, denominator: u32) -> u32 {
+    fn is_within(&self, code: &mut Code<'_>, face: &Face, numerator: u32, denominator: u32) -> u32 {
         let [numerator, denominator] = [numerator, denominator].map(|value| code.uint(op::BITCAST, &[value]));
         let [sign, rest] = [1 << 31, !(1 << 31)].map(|bits| code.constant_uint(bits));
         let sign = code.uint(op::BITWISE_AND, &[denominator, sign]);
         let magnitude = code.uint(op::BITWISE_AND, &[denominator, rest]);
         let turned = code.uint(op::BITWISE_XOR, &[numerator, sign]);
         let [turned, magnitude] = [turned, magnitude].map(|value| code.float(op::BITCAST, &[value]));
-        let zero = code.constant_float(0.0);
-        let most = code.float(op::F_MUL, &[self.t_max, magnitude]);
-        let ahead = code.bool(op::F_ORD_GREATER_THAN, &[turned, zero]);
-        let before = code.bool(op::F_ORD_LESS_THAN, &[turned, most]);
+        let [zero, minus_one] = [0.0, -1.0].map(|value| code.constant_float(value));
+        let (end, ahead, before) = if face.triangles.len() == 1 {
+            (self.t_max, op::F_ORD_GREATER_THAN, op::F_ORD_LESS_THAN)
+        } else {
+            (code.float(op::F_MUL, &[self.t_max, minus_one]), op::F_ORD_LESS_THAN, op::F_ORD_GREATER_THAN)
+        };
+        let end = code.float(op::F_MUL, &[end, magnitude]);
+        let ahead = code.bool(ahead, &[turned, zero]);
+        let before = code.bool(before, &[turned, end]);
         code.bool(op::LOGICAL_AND, &[ahead, before])
     }
 
@@ -195,6 +211,9 @@ pub(super) fn emit_search(code: &mut Code<'_>, ray: &RayIds, faces: &[Face], sea
     let [zero_float, zero_int] = [code.constant_float(0.0), code.constant_int(0)];
     let (mut nearest, mut number, mut occluded, mut doubtful) = (ray.t_max, none, None, None);
     for face in faces {
+        if let [triangle] = &face.triangles[..] {
+            ray.prepare(code, triangle);
+        }
         let meets: Vec<u32> = face.triangles.iter().map(|triangle| ray.meets(code, triangle)).collect();
         let word = meets[1..].iter().fold(meets[0], |word, &other| code.int(op::BITWISE_OR, &[word, other]));
         let met = code.bool(op::S_LESS_THAN, &[word, zero_int]);
@@ -205,7 +224,7 @@ pub(super) fn emit_search(code: &mut Code<'_>, ray: &RayIds, faces: &[Face], sea
         let [numerator, denominator] = ray.distance(code, face);
         let allowed = ray.is_allowed(code, face);
         if search == Search::Occluded {
-            let within = ray.is_within(code, numerator, denominator);
+            let within = ray.is_within(code, face, numerator, denominator);
             let hit = all(code, &[met, within, allowed]);
             occluded = Some(either(code, occluded, hit));
             continue;
