@@ -36,20 +36,24 @@ uint morton(uint x, uint y) {
     return (z | z >> 15u) & 0x3ffu;
 }
 
-// Σ over the levels l ≥ 1 of (z_{2l−2} + z_{2l−1} x) / (1 + x + x²)^l over F2 as a power series; bit r is the coefficient of x^r.
-uint pixel_digits(uint z) {
+// Σ over the levels l ≥ 1 of d_{2l−2} / (1 + x + x²)^l over F2 as a power series, where d_k is bit 31 − k of `digits`; bit r of
+// the sum is the coefficient of x^r.
+uint sum_over_levels(uint digits) {
     uint s = 0u;
-    if ((z & 1u) != 0u) s ^= 0xdb6db6dbu;
-    if ((z & 2u) != 0u) s ^= 0xb6db6db6u;
-    if ((z & 4u) != 0u) s ^= 0x45145145u;
-    if ((z & 8u) != 0u) s ^= 0x8a28a28au;
-    if ((z & 16u) != 0u) s ^= 0x77077077u;
-    if ((z & 32u) != 0u) s ^= 0xee0ee0eeu;
-    if ((z & 64u) != 0u) s ^= 0x11011011u;
-    if ((z & 128u) != 0u) s ^= 0x22022022u;
-    if ((z & 256u) != 0u) s ^= 0x6b006b6bu;
-    if ((z & 512u) != 0u) s ^= 0xd600d6d6u;
+    if ((digits & 0x80000000u) != 0u) s ^= 0xdb6db6dbu;
+    if ((digits & 0x20000000u) != 0u) s ^= 0x45145145u;
+    if ((digits & 0x08000000u) != 0u) s ^= 0x77077077u;
+    if ((digits & 0x02000000u) != 0u) s ^= 0x11011011u;
+    if ((digits & 0x00800000u) != 0u) s ^= 0x6b006b6bu;
     return s;
+}
+
+// By what a pixel's points are shifted: Σ (z_{2l−2} + z_{2l−1} x) / (1 + x + x²)^l, and in the second coordinate the same with
+// z_{2l−2} + z_{2l−1} in the place of z_{2l−2}. Bit 31 − k of `digits` is z_k.
+uvec2 pixel_shifts(uint digits) {
+    uint odd = sum_over_levels(digits << 1u);
+    uint first = sum_over_levels(digits) ^ odd << 1u;
+    return uvec2(first, first ^ odd);
 }
 
 // The order of a pixel's samples: a permutation that keeps [2^m, 2^(m+1)) for every m, and within it aligned runs. Each
@@ -64,7 +68,7 @@ uint sobol_order(uint index, uint seed) {
 // of the samples, of the pixels, the scrambling of each coordinate.
 uvec2 sobol_pair(uint index, uint z, uvec4 seeds) {
     uint i = sobol_order(index, seeds.x ^ z * 0x9e3779b9u);
-    z = shuffle(z, seeds.y);
+    uvec2 shifts = pixel_shifts(scramble_reversed(bitfieldReverse(z), seeds.y));
     // The digits of the first coordinate are the bits of i; those of the second Pascal's triangle modulo 2 times them:
     // bit k ^= bit k + s, for every power of two s.
     uint j = i;
@@ -73,8 +77,8 @@ uvec2 sobol_pair(uint index, uint z, uvec4 seeds) {
     j ^= (j >> 4u) & 0x0f0f0f0fu;
     j ^= (j >> 8u) & 0x00ff00ffu;
     j ^= (j >> 16u) & 0x0000ffffu;
-    i ^= pixel_digits(z);
-    j ^= pixel_digits(z ^ (z >> 1u & 0x155u));
+    i ^= shifts.x;
+    j ^= shifts.y;
     return uvec2(bitfieldReverse(scramble_reversed(i, seeds.z)), bitfieldReverse(scramble_reversed(j, seeds.w)));
 }
 

@@ -87,7 +87,7 @@ mutations! {
         caught by "sobol::powers_of_two_of_samples_are_nets";
     /// Neighbours have the same points.
     pixels_alike: "include/sobol.glsl",
-        "i ^= pixel_digits(z);" => "",
+        "i ^= shifts.x;" => "",
         caught by "sobol::squares_of_pixels_complete_each_other";
     /// The square root of a negative number beyond the critical angle.
     unclamped_cosine: "include/fresnel.glsl",
