@@ -28,6 +28,9 @@ vec3 safe_normalize(vec3 v) {
     return scaled * inversesqrt(dot(scaled, scaled));
 }
 
+// A whole number in [0, 2^22) without a conversion, which lavapipe (Mesa 25) makes lane by lane, since it saturates.
+uint small_whole(float x) { return floatBitsToUint(x + 8388608.0) & 0x3fffffu; }
+
 // (cos 2πu, sin 2πu) for u in [0, 1]. The argument is reduced to [−π/4, π/4], where the polynomials (the single-precision
 // ones of the Cephes library, sinf.c) are good to 1 ulp.
 vec2 cos_sin_turns(float u) {
@@ -36,11 +39,11 @@ vec2 cos_sin_turns(float u) {
     float x2 = x * x;
     float s = x * (1.0 + x2 * (-1.6666654611e-1 + x2 * (8.3321608736e-3 + x2 * -1.9515295891e-4)));
     float c = 1.0 + x2 * (-0.5 + x2 * (4.166664568298827e-2 + x2 * (-1.388731625493765e-3 + x2 * 2.443315711809948e-5)));
-    int k = int(quadrant);
-    bool swap = (k & 1) != 0;
+    uint k = small_whole(quadrant);
+    bool swap = (k & 1u) != 0u;
     float sine = swap ? c : s;
     float cosine = swap ? s : c;
-    return vec2(((k + 1) & 2) != 0 ? -cosine : cosine, (k & 2) != 0 ? -sine : sine);
+    return vec2(((k + 1u) & 2u) != 0u ? -cosine : cosine, (k & 2u) != 0u ? -sine : sine);
 }
 
 // e^−x for x ≥ 0 to 2 ulp, infinity too (Cephes expf.c); 0 where it is below the normal numbers.
