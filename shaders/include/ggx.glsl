@@ -117,7 +117,7 @@ GgxAlbedo ggx_albedo(uint table, vec3 wo, vec2 alpha) {
         return ggx_anisotropic_albedo(table + GGX_ALBEDO_SIZE * GGX_ALBEDO_SIZE, wo, alpha);
     float stretched = ggx_stretched_length(wo, alpha);
     vec2 at = ggx_albedo_coordinates(wo, alpha) * float(GGX_ALBEDO_SIZE - 1u);
-    uvec2 cell = min(uvec2(at), uvec2(GGX_ALBEDO_SIZE - 2u));
+    uvec2 cell = min(small_whole(floor(at)), uvec2(GGX_ALBEDO_SIZE - 2u));
     vec2 f = at - vec2(cell);
     uint first = table + cell.y * GGX_ALBEDO_SIZE + cell.x;
     vec4 low = uintBitsToFloat(LOAD4(TABLES, first));

@@ -28,8 +28,10 @@ vec3 safe_normalize(vec3 v) {
     return scaled * inversesqrt(dot(scaled, scaled));
 }
 
-// A whole number in [0, 2^22) without a conversion, which lavapipe (Mesa 25) makes lane by lane, since it saturates.
-uint small_whole(float x) { return floatBitsToUint(x + 8388608.0) & 0x3fffffu; }
+// A whole number in [0, 2^23) by its bits. A conversion saturates, which lavapipe (Mesa 25) does lane by lane. What is not
+// finite gives 0 or 2^22.
+uint small_whole(float x) { return floatBitsToUint(x + 8388608.0) & 0x7fffffu; }
+uvec2 small_whole(vec2 x) { return floatBitsToUint(x + 8388608.0) & 0x7fffffu; }
 
 // (cos 2πu, sin 2πu) for u in [0, 1]. The argument is reduced to [−π/4, π/4], where the polynomials (the single-precision
 // ones of the Cephes library, sinf.c) are good to 1 ulp.
@@ -53,7 +55,7 @@ float exp_minus(float x) {
     float r = (n * 0.693359375 - x) + n * -2.12194440e-4;
     float p = ((((1.9875691500e-4 * r + 1.3981999507e-3) * r + 8.3334519073e-3) * r + 4.1665795894e-2) * r +
                1.6666665459e-1) * r + 5.0000001201e-1;
-    return (p * r * r + r + 1.0) * uintBitsToFloat((127u - uint(n)) << 23u);
+    return (p * r * r + r + 1.0) * uintBitsToFloat((127u - small_whole(n)) << 23u);
 }
 
 // atan(x) for x in [0, 1] (Cephes atanf.c): above tan(π/8) the argument (x − 1)/(x + 1) is used.

@@ -71,7 +71,9 @@ uint mip_level(TextureHeader header, mat4x3 footprint) {
     float larger = sqrt(0.5 * (aa + bb + length(vec2(aa - bb, 2.0 * dot(a, b)))));
     float texels = length(cross(a, b)) / larger;
     if (!(texels >= 2.0)) return 0u;
-    return uint(min(findMSB(uint(min(texels, 65536.0))), findMSB(max(header.width, header.height))));
+    // The logarithm is the exponent.
+    uint level = (floatBitsToUint(texels) >> 23u) - 127u;
+    return min(level, uint(findMSB(max(header.width, header.height))));
 }
 
 // The header of a level ≥ 1: its texels are linear and have 16 bits (src/prepare/mip.rs).
@@ -95,10 +97,11 @@ vec4 sample_texture(RenderConstants constants, uint index, vec4 texcoords, mat4x
         uv = vec2(dot(header.u_row, vec3(uv, 1.0)), dot(header.v_row, vec3(uv, 1.0)));
     float x = texel_coordinate(uv.x, header.width, (header.sampling >> TEXTURE_WRAP_U_SHIFT) & 3u);
     float y = texel_coordinate(uv.y, header.height, (header.sampling >> TEXTURE_WRAP_V_SHIFT) & 3u);
-    if ((header.sampling & TEXTURE_NEAREST) != 0u) return fetch_texel(header, ivec2(floor(vec2(x, y))));
+    if ((header.sampling & TEXTURE_NEAREST) != 0u) return fetch_texel(header, ivec2(small_whole(floor(vec2(x, y)))));
     vec2 corner = floor(vec2(x, y) - 0.5);
     vec2 f = vec2(x, y) - 0.5 - corner;
-    ivec2 t = ivec2(corner);
+    // The corner is at least −1.
+    ivec2 t = ivec2(small_whole(corner + 1.0)) - 1;
     vec4 top = mix(fetch_texel(header, t), fetch_texel(header, t + ivec2(1, 0)), f.x);
     vec4 bottom = mix(fetch_texel(header, t + ivec2(0, 1)), fetch_texel(header, t + ivec2(1, 1)), f.x);
     return mix(top, bottom, f.y);
