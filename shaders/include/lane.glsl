@@ -48,7 +48,7 @@ uvec2 pixel_of_index(RenderConstants constants, uint index) {
     uint tiles_across = (constants.width + 7u) / 8u;
     uint tile = index / 64u;
     uint inside = index % 64u;
-    return uvec2(tile % tiles_across, tile / tiles_across) * 8u + uvec2(inside % 8u, inside / 8u);
+    return divide_whole(tile, tiles_across).yx * 8u + uvec2(inside % 8u, inside / 8u);
 }
 
 void begin_block(inout LaneState lane) {
@@ -94,8 +94,9 @@ LaneState idle_lane() {
 void begin_atom(inout LaneState lane, RenderConstants constants, SliceConstants slice, uint index) {
     uint pixels = ((constants.width + 7u) / 8u) * ((constants.height + 7u) / 8u) * 64u;
     uint atom = slice.first_atom + index;
-    uvec2 pixel = pixel_of_index(constants, atom % pixels);
-    uint first = (slice.first_block + atom / pixels) * BLOCK_SAMPLES;
+    uvec2 block_and_pixel = divide_whole(atom, pixels);
+    uvec2 pixel = pixel_of_index(constants, block_and_pixel.y);
+    uint first = (slice.first_block + block_and_pixel.x) * BLOCK_SAMPLES;
     bool outside = pixel.x >= constants.width || pixel.y >= constants.height;
     lane.atom = index;
     lane.ray_limit = slice.ray_budget;

@@ -1,5 +1,6 @@
 #version 460
-// math.glsl at one number a lane: x -> cos and sin of x turns; x, y -> the angle of (x, y) in turns; the floats next to y.
+// math.glsl at one number a lane: x -> cos and sin of x turns; x, y -> the angle of (x, y) in turns; the floats next to y;
+// the bits of y divided by those of z.
 #include "../include/test_kernel.glsl"
 #include "../include/math.glsl"
 
@@ -9,5 +10,6 @@ void main() {
     vec4 x = uintBitsToFloat(inputs[lane]);
     vec2 cs = cos_sin_turns(x.x);
     outputs[2u * lane] = floatBitsToUint(vec4(cs, turns(x.z, x.y), atan_unit(x.w)));
-    outputs[2u * lane + 1u] = floatBitsToUint(vec4(next_float_up(x.y), next_float_down(x.y), 0.0, 0.0));
+    vec2 next = vec2(next_float_up(x.y), next_float_down(x.y));
+    outputs[2u * lane + 1u] = uvec4(floatBitsToUint(next), divide_whole(inputs[lane].y, inputs[lane].z));
 }
