@@ -55,7 +55,9 @@ fn quotients_of_whole_numbers_are_exact() {
         for i in 0..64_u32 {
             let anywhere = (u64::from(largest) * u64::from(i) / 63) as u32;
             let multiple = anywhere / b * b;
-            inputs.extend([multiple.saturating_sub(1), multiple, multiple.saturating_add(1), anywhere].map(|a| [0, a, b, 0]));
+            inputs.extend(
+                [multiple.saturating_sub(1), multiple, multiple.saturating_add(1), anywhere].map(|a| [0, a, b, 0]),
+            );
         }
     }
     let outputs = gpu::call("math.comp", &inputs, inputs.len() as u32, 2);
