@@ -85,8 +85,7 @@ vec4 environment_lookup(RenderConstants constants, vec2 uv) {
     vec2 p = uv * vec2(constants.environment_width, constants.environment_height) - 0.5;
     vec2 corner = floor(p);
     vec2 f = p - corner;
-    // The corner is at least −1.
-    return environment_interpolate(constants, ivec2(small_whole(corner + 1.0)) - 1, 1.0 - f, f);
+    return environment_interpolate(constants, texel_of_corner(corner), 1.0 - f, f);
 }
 
 // Radiance that arrives from direction `w`, and the density with which environment_sample draws it.

@@ -33,6 +33,9 @@ vec3 safe_normalize(vec3 v) {
 uint small_whole(float x) { return floatBitsToUint(x + 8388608.0) & 0x7fffffu; }
 uvec2 small_whole(vec2 x) { return floatBitsToUint(x + 8388608.0) & 0x7fffffu; }
 
+// The texel at the corner of a lookup's square: whole numbers from −1 on.
+ivec2 texel_of_corner(vec2 corner) { return ivec2(small_whole(corner + 1.0)) - 1; }
+
 // Quotient and remainder, for quotients of at most 2^28 and b of at most 2^31; lavapipe divides integers lane by lane. The upper
 // digits of the quotient first, then the 10 below: with the factor, which outweighs all roundings (a quotient of floats may err
 // by 2.5 ulp), neither is too large, and the sum is at most one too small.

@@ -56,10 +56,13 @@ void store_kept_result_in_turn() {
 }
 
 void finish_atom(LaneState lane) {
-    store_kept_result();
-    kept_result = block_result(lane);
-    kept_atom = lane.atom;
-    if (!BAKES_GEOMETRY) store_kept_result();
+    if (BAKES_GEOMETRY) {
+        store_kept_result();
+        kept_result = block_result(lane);
+        kept_atom = lane.atom;
+    } else {
+        results[lane.atom] = block_result(lane);
+    }
     if (HAS_EXTRAS) store_extras(lane.atom);
     finished_atoms += 1u;
 }

@@ -100,8 +100,7 @@ vec4 sample_texture(RenderConstants constants, uint index, vec4 texcoords, mat4x
     if ((header.sampling & TEXTURE_NEAREST) != 0u) return fetch_texel(header, ivec2(small_whole(floor(vec2(x, y)))));
     vec2 corner = floor(vec2(x, y) - 0.5);
     vec2 f = vec2(x, y) - 0.5 - corner;
-    // The corner is at least −1.
-    ivec2 t = ivec2(small_whole(corner + 1.0)) - 1;
+    ivec2 t = texel_of_corner(corner);
     vec4 top = mix(fetch_texel(header, t), fetch_texel(header, t + ivec2(1, 0)), f.x);
     vec4 bottom = mix(fetch_texel(header, t + ivec2(0, 1)), fetch_texel(header, t + ivec2(1, 1)), f.x);
     return mix(top, bottom, f.y);

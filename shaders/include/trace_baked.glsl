@@ -17,7 +17,8 @@ const float BAKED_GRAZING = 0.000244140625;
 
 // Ray space (watertight.glsl) as two rows that map what is relative to the origin. Of each row one component is 1 and one
 // 0, so a row times a vector has the two roundings of meet_triangle: no test differs from the other form's. The vectors begin
-// at a vertex and end at the origin; where that does not cancel, in the third row, the sign is turned.
+// at a vertex and end at the origin; where that does not cancel, the other factor's sign is turned too: the third row's, and the
+// direction's (`back`).
 struct BakedRay {
     vec3 row_x;
     vec3 row_y;
@@ -49,13 +50,13 @@ struct Found {
 // `zero` is a 0 that no compiler knows: x + zero turns −0 into +0.
 //
 // Distance (as bits) and slot of the nearest triangle, NONE if there is none, and whether a triangle was doubtful.
-uvec3 baked_nearest(const vec3 origin, const vec3 direction, const vec3 row_x, const vec3 row_y, const vec3 row_z,
+uvec3 baked_nearest(const vec3 origin, const vec3 back, const vec3 row_x, const vec3 row_y, const vec3 row_z,
                     const float t_max, const float zero, const float grazing, const uint from, const uint towards) {
     return uvec3(0u, NONE, 0u);
 }
 
 // Whether there is any, and whether a triangle was doubtful.
-uvec2 baked_occluded(const vec3 origin, const vec3 direction, const vec3 row_x, const vec3 row_y, const vec3 row_z,
+uvec2 baked_occluded(const vec3 origin, const vec3 back, const vec3 row_x, const vec3 row_y, const vec3 row_z,
                      const float t_max, const float zero, const float grazing, const uint from, const uint towards) {
     return uvec2(0u);
 }
@@ -95,7 +96,7 @@ Found find_nearest(RenderConstants constants, Ray ray) {
     if (HAS_STATISTICS) count_search_step();
     if (COUNTS_VISITS) tested_triangles += baked_nearest_tests();
     BakedRay b = baked_ray(ray);
-    uvec3 found = baked_nearest(ray.origin, ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
+    uvec3 found = baked_nearest(ray.origin, -ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
                                 ray.from.slot, ray.towards.slot);
     if (found.z != 0u) return search_numbers(ray);
     return Found(found.y, uintBitsToFloat(found.x));
@@ -117,7 +118,7 @@ bool trace_occluded(RenderConstants constants, Ray ray) {
     if (HAS_STATISTICS) count_search_step();
     if (COUNTS_VISITS) tested_triangles += baked_occluded_tests();
     BakedRay b = baked_ray(ray);
-    uvec2 found = baked_occluded(ray.origin, ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
+    uvec2 found = baked_occluded(ray.origin, -ray.direction, b.row_x, b.row_y, b.row_z, b.t_max, constants.zero, b.grazing,
                                  ray.from.slot, ray.towards.slot);
     if (found.y != 0u) return search_numbers(ray).slot != NONE;
     return found.x != 0u;

@@ -17,7 +17,8 @@ pub(super) enum Search {
 /// The ids of a ray's numbers.
 pub(super) struct RayIds {
     origin: [u32; 3],
-    direction: [u32; 3],
+    /// The direction with the other sign.
+    back: [u32; 3],
     row_x: [u32; 3],
     row_y: [u32; 3],
     row_z: [u32; 3],
@@ -32,11 +33,10 @@ pub(super) struct RayIds {
 
 impl RayIds {
     pub(super) fn new(code: &mut Code<'_>, parameters: &[u32], faces: &[Face]) -> Option<Self> {
-        let &[origin, direction, row_x, row_y, row_z, t_max, zero, grazing, from, towards] = parameters else {
+        let &[origin, back, row_x, row_y, row_z, t_max, zero, grazing, from, towards] = parameters else {
             return None;
         };
-        let [origin, direction, row_x, row_y, row_z] =
-            [origin, direction, row_x, row_y, row_z].map(|v| code.components(v));
+        let [origin, back, row_x, row_y, row_z] = [origin, back, row_x, row_y, row_z].map(|v| code.components(v));
         let numbers = || faces.iter().flat_map(|face| &face.triangles).map(|t| t.number);
         let words = numbers().max().map_or(0, |number| number / SET_BITS + 1);
         let excluded = (0..words)
@@ -47,7 +47,7 @@ impl RayIds {
                 })
             })
             .collect();
-        Some(Self { origin, direction, row_x, row_y, row_z, t_max, zero, grazing, excluded })
+        Some(Self { origin, back, row_x, row_y, row_z, t_max, zero, grazing, excluded })
     }
 
     /// The origin relative to a vertex. The other way round the literal would be the first operand of a subtraction, which
@@ -127,8 +127,9 @@ impl RayIds {
         sum.unwrap_or_else(|| code.constant_float(0.0))
     }
 
+    /// The speed against the normal.
     fn speed(&self, code: &mut Code<'_>, face: &Face) -> u32 {
-        self.along(code, face.normal, self.direction)
+        self.along(code, face.normal, self.back)
     }
 
     /// Whether the distance to the face is doubtful: never along an axis, where height and speed are not sums, and not where
@@ -142,9 +143,8 @@ impl RayIds {
         })
     }
 
-    /// The distance to a face as a fraction. For a plane of two triangles, of the origin's height above it over the speed along
-    /// the normal, whose ratio is the distance with the other sign; of one triangle, interpolated by the edge functions between
-    /// the distances of its vertices.
+    /// The distance to a face as a fraction: of the origin's height over the speed against the normal for a plane of two
+    /// triangles; of one triangle, interpolated by the edge functions between the distances of its vertices.
     fn distance(&self, code: &mut Code<'_>, face: &Face) -> [u32; 2] {
         let [a, b, c] = face.triangles[0].vertices;
         if face.triangles.len() > 1 {
@@ -162,28 +162,23 @@ impl RayIds {
         if face.triangles.len() == 1 {
             return code.float(op::F_DIV, &[numerator, denominator]);
         }
-        let minus_one = code.constant_float(-1.0);
-        let inverse = code.float(op::F_DIV, &[minus_one, denominator]);
+        let one = code.constant_float(1.0);
+        let inverse = code.float(op::F_DIV, &[one, denominator]);
         code.float(op::F_MUL, &[numerator, inverse])
     }
 
     /// Whether a distance lies between 0 and `t_max`, without dividing.
-    fn is_within(&self, code: &mut Code<'_>, face: &Face, numerator: u32, denominator: u32) -> u32 {
+    fn is_within(&self, code: &mut Code<'_>, numerator: u32, denominator: u32) -> u32 {
         let [numerator, denominator] = [numerator, denominator].map(|value| code.uint(op::BITCAST, &[value]));
         let [sign, rest] = [1 << 31, !(1 << 31)].map(|bits| code.constant_uint(bits));
         let sign = code.uint(op::BITWISE_AND, &[denominator, sign]);
         let magnitude = code.uint(op::BITWISE_AND, &[denominator, rest]);
         let turned = code.uint(op::BITWISE_XOR, &[numerator, sign]);
         let [turned, magnitude] = [turned, magnitude].map(|value| code.float(op::BITCAST, &[value]));
-        let [zero, minus_one] = [0.0, -1.0].map(|value| code.constant_float(value));
-        let (end, ahead, before) = if face.triangles.len() == 1 {
-            (self.t_max, op::F_ORD_GREATER_THAN, op::F_ORD_LESS_THAN)
-        } else {
-            (code.float(op::F_MUL, &[self.t_max, minus_one]), op::F_ORD_LESS_THAN, op::F_ORD_GREATER_THAN)
-        };
-        let end = code.float(op::F_MUL, &[end, magnitude]);
-        let ahead = code.bool(ahead, &[turned, zero]);
-        let before = code.bool(before, &[turned, end]);
+        let zero = code.constant_float(0.0);
+        let most = code.float(op::F_MUL, &[self.t_max, magnitude]);
+        let ahead = code.bool(op::F_ORD_GREATER_THAN, &[turned, zero]);
+        let before = code.bool(op::F_ORD_LESS_THAN, &[turned, most]);
         code.bool(op::LOGICAL_AND, &[ahead, before])
     }
 
@@ -224,7 +219,7 @@ pub(super) fn emit_search(code: &mut Code<'_>, ray: &RayIds, faces: &[Face], sea
         let [numerator, denominator] = ray.distance(code, face);
         let allowed = ray.is_allowed(code, face);
         if search == Search::Occluded {
-            let within = ray.is_within(code, face, numerator, denominator);
+            let within = ray.is_within(code, numerator, denominator);
             let hit = all(code, &[met, within, allowed]);
             occluded = Some(either(code, occluded, hit));
             continue;
