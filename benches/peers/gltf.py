@@ -76,6 +76,7 @@ def write_gltf(scene, folder: Path) -> Path:
         "buffers": [{"uri": f"{scene.name}.bin", "byteLength": len(data)}],
         "extensionsUsed": ["KHR_materials_ior", "KHR_materials_emissive_strength"],
     }
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{scene.name}.bin").write_bytes(data)
     path = folder / f"{scene.name}.gltf"
     path.write_text(json.dumps(document))
@@ -85,4 +86,11 @@ def write_gltf(scene, folder: Path) -> Path:
 if __name__ == "__main__":
     from scenes import SCENES
 
-    print(write_gltf(SCENES[sys.argv[1]](*map(int, sys.argv[3:])), Path(sys.argv[2])))
+    if len(sys.argv) < 3 or sys.argv[1] not in SCENES:
+        print(f"{__doc__}\nscenes: {', '.join(SCENES)}", file=sys.stderr)
+        sys.exit(2)
+    chosen, target = SCENES[sys.argv[1]](*map(int, sys.argv[3:])), Path(sys.argv[2])
+    print(write_gltf(chosen, target))
+    if chosen.environment is not None:
+        write_hdr(target / f"{chosen.name}.hdr", chosen.environment)
+        print(target / f"{chosen.name}.hdr")
