@@ -22,6 +22,12 @@ def write_hdr(path: Path, image: numpy.ndarray) -> None:
         file.write(texels.astype(numpy.uint8).tobytes())
 
 
+def write_environment(scene, folder: Path) -> Path:
+    path = folder / f"{scene.name}.hdr"
+    write_hdr(path, scene.environment)
+    return path
+
+
 def material_to_gltf(material) -> dict:
     out = {"name": material.name,
            "pbrMetallicRoughness": {"baseColorFactor": [*map(float, material.colour), 1.0]}, "extensions": {}}
@@ -92,5 +98,4 @@ if __name__ == "__main__":
     chosen, target = SCENES[sys.argv[1]](*map(int, sys.argv[3:])), Path(sys.argv[2])
     print(write_gltf(chosen, target))
     if chosen.environment is not None:
-        write_hdr(target / f"{chosen.name}.hdr", chosen.environment)
-        print(target / f"{chosen.name}.hdr")
+        print(write_environment(chosen, target))

@@ -111,13 +111,13 @@ def references(children, images, chosen) -> dict:
 
 def compare_scene(name, renderers, chosen) -> dict:
     from children import LACKS, Child, needs
-    from gltf import write_hdr
+    from gltf import write_environment
     from measure import equality, errors
     from scenes import SCENES
 
     scene = SCENES[name]()
     if scene.environment is not None:
-        write_hdr(chosen.out / f"{name}.hdr", scene.environment)
+        write_environment(scene, chosen.out)
     missing = {renderer: sorted(LACKS.get(renderer, set()) & needs(scene)) for renderer in renderers}
     children = {}
     try:
