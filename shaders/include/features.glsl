@@ -49,6 +49,8 @@ const bool HAS_ATTRIBUTES = HAS_NORMALS || HAS_TEXTURES || HAS_NORMAL_MAPS || HA
 const bool BAKES_GEOMETRY = (BAKED & 1u) != 0u;
 const bool BAKES_MATERIALS = (BAKED & 2u) != 0u;
 const bool BAKES_LIGHTS = (BAKED & 4u) != 0u;
+// Of the geometry the largest faces alone (src/prepare/large_faces.rs).
+const bool BAKES_LARGE_FACES = (BAKED & 8u) != 0u;
 
 #define HAS_BSDF(kind) ((BSDFS & (1u << (kind))) != 0u)
 #define HAS_LIGHT(kind) ((LIGHTS & (1u << (kind))) != 0u)

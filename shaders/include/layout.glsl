@@ -114,8 +114,8 @@ struct RenderConstants {
     float clamp_indirect;
     float zero;
     uint environment_rgbe;
-    uint unused_0;
-    uint unused_1;
+    uint rest_root_slot;
+    uint unused;
 };
 
 struct SliceConstants {

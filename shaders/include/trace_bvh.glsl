@@ -45,8 +45,10 @@ struct Trace {
 
 uint trace_stack[STACK_SIZE];
 
+// In memory entries stand inverted. lavapipe (Mesa 25) runs a handful of instructions behind a condition for all lanes, in place of a
+// branch, and what it stores and loads there lane by lane; with one more instruction it branches (docs/benchmarks).
 void push_entry(inout Trace trace, uint entry) {
-    if (trace.entry_3 != 0u) trace_stack[trace.depth++] = trace.entry_3;
+    if (trace.entry_3 != 0u) trace_stack[trace.depth++] = ~trace.entry_3;
     trace.entry_3 = trace.entry_2;
     trace.entry_2 = trace.entry_1;
     trace.entry_1 = trace.entry_0;
@@ -60,7 +62,7 @@ uint pop_entry(inout Trace trace) {
     trace.entry_2 = trace.entry_3;
     trace.entry_3 = 0u;
     // Entries spill one by one, so memory holds any only while all four registers were full: refill at the end.
-    if (trace.depth > 0u) trace.entry_3 = trace_stack[--trace.depth];
+    if (trace.depth > 0u) trace.entry_3 = ~trace_stack[--trace.depth];
     return entry;
 }
 
@@ -78,11 +80,24 @@ void set_ray(inout Trace trace, vec3 origin, vec3 direction) {
     trace.space = ray_space(direction);
 }
 
+// The large faces, which are compiled in, before the tree of the rest.
+void meet_large_faces(inout Trace trace, RenderConstants constants, Ray ray) {
+    Found found = find_nearest(constants, ray);
+    if (found.slot == NONE) return;
+    TriangleMeeting meeting = meet_number(ray, trace.space, found.slot);
+    // Interpolated, as those of the tree are, so that their order is kept. Only where it is lost to rounding, by the plane.
+    float t = meeting.t > 0.0 ? meeting.t : found.t;
+    trace.hit = Hit(TriangleId(found.slot, NONE), t, meeting.scaled);
+    trace.determinant = meeting.determinant;
+    if (ray.any_hit) trace.current = NONE;
+}
+
 void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alpha_key) {
     set_ray(trace, ray.origin, ray.direction);
     trace.hit = Hit(NO_TRIANGLE, ray.t_max, vec2(0.0));
     trace.determinant = 1.0;
-    trace.current = ray_is_valid(ray) ? constants.root_slot : NONE;
+    uint root = BAKES_LARGE_FACES ? constants.rest_root_slot : constants.root_slot;
+    trace.current = ray_is_valid(ray) ? root : NONE;
     trace.instance = NONE;
     trace.top = 0u;
     trace.entry_0 = 0u;
@@ -97,6 +112,7 @@ void trace_begin(out Trace trace, RenderConstants constants, Ray ray, uvec2 alph
     trace.world_direction = ray.direction;
     trace.first = 0u;
     trace.alpha_key = alpha_key;
+    if (BAKES_LARGE_FACES) meet_large_faces(trace, constants, ray);
     if (BAKES_GEOMETRY) {
         // Done at once.
         trace.current = NONE;

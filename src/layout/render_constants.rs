@@ -87,6 +87,8 @@ pub struct RenderConstants {
     pub zero: f32,
     /// 1 if the environment's texels are in RGBE, as quads (src/prepare/environment.rs).
     pub environment_rgbe: u32,
+    /// Slot at which traversal starts when the large faces are compiled in (src/prepare/large_faces.rs).
+    pub rest_root_slot: u32,
     /// Unused, zero.
-    pub unused: [u32; 2],
+    pub unused: u32,
 }

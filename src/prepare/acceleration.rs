@@ -10,6 +10,7 @@ use super::bvh::{self, BvhQuality, Primitive, Slot, Tree};
 use super::geometry::{Geometry, SharedMesh};
 use super::instances::Matrices;
 use super::kept::Kept;
+use super::large_faces;
 use super::{COORDINATE_LIMIT, PrepareError, PreparedMesh};
 use crate::layout::{InstanceRecord, InstanceSlot, SLOT_INSTANCE, TRIANGLE_INDEX_MASK, TRIANGLE_LIGHT, Triangle};
 
@@ -66,11 +67,18 @@ pub(super) fn build(
     let mut primitives = primitives(&geometry.world);
     let first_instance = primitives.len() as u32;
     primitives.extend((first_instance..).zip(&acceleration.instance_bounds).map(|(i, b)| Primitive::new(i, b)));
+    let large = large_faces::choose(&geometry.world.leaves, &primitives);
+    let large = (!large.is_empty()).then(|| {
+        let is_large = |primitive: &Primitive| large.binary_search(&primitive.index()).is_ok();
+        let (apart, others) = primitives.iter().partition(|primitive| is_large(primitive));
+        primitives = others;
+        kept.tree(apart, quality)
+    });
     let tree = kept.tree(primitives, quality);
-    acceleration.bounds = tree.bounds();
-    append(&mut acceleration, &tree, &mut geometry.world)?;
+    acceleration.bounds = tree.bounds().union(large.as_ref().map_or(Bounds::EMPTY, |large| large.bounds()));
+    append(&mut acceleration, large.as_deref(), &tree, &mut geometry.world)?;
     for (tree, mesh) in trees.iter().zip(&mut geometry.shared) {
-        append(&mut acceleration, tree, &mut mesh.geometry)?;
+        append(&mut acceleration, None, tree, &mut mesh.geometry)?;
     }
     for (instance, &mesh) in acceleration.instances.iter_mut().zip(&acceleration.instance_meshes) {
         instance.root_slot = acceleration.meshes[mesh].root_slot;
@@ -119,8 +127,13 @@ fn place_instances(
     Ok(())
 }
 
-/// Writes a tree behind what is there: leaves of `mesh`, and beyond them instances.
-fn append(acceleration: &mut Acceleration, tree: &Tree, mesh: &mut MeshGeometry) -> Result<(), PrepareError> {
+/// Writes a tree behind what is there, of what is not among the large leaves: leaves of `mesh`, and beyond them instances.
+fn append(
+    acceleration: &mut Acceleration,
+    large: Option<&Tree>,
+    tree: &Tree,
+    mesh: &mut MeshGeometry,
+) -> Result<(), PrepareError> {
     let first_slot = acceleration.slots.len() as u32;
     let (leaves, emissive) = (&mesh.leaves, &mut mesh.emissive);
     let triangles = &mut acceleration.triangles;
@@ -133,7 +146,7 @@ fn append(acceleration: &mut Acceleration, tree: &Tree, mesh: &mut MeshGeometry)
             emissive[(triangle.kind & TRIANGLE_INDEX_MASK) as usize].slot = number;
         }
     };
-    let written = tree.append(&mut acceleration.slots, |primitive, slot| {
+    let leaf = |primitive, slot| {
         let Some(leaf) = leaves.get(primitive as usize) else {
             let instance = primitive - leaves.len() as u32;
             return bytemuck::cast(InstanceSlot { instance, kind: SLOT_INSTANCE, ..InstanceSlot::default() });
@@ -143,10 +156,15 @@ fn append(acceleration: &mut Acceleration, tree: &Tree, mesh: &mut MeshGeometry)
             put(2 * slot + 1, second);
         }
         bytemuck::cast(leaf.slot)
-    })?;
+    };
+    let slots = &mut acceleration.slots;
+    let (written, rest_root) = match large {
+        None => tree.append(slots, leaf).map(|written| (written, written.root_slot))?,
+        Some(large) => large.append_beside(tree, slots, leaf)?,
+    };
     if cfg!(debug_assertions) {
         let valid = bvh::validate(&acceleration.slots, written.root_slot, &acceleration.instance_bounds);
-        let expected = tree.leaves();
+        let expected = tree.leaves() + large.map_or(0, Tree::leaves);
         match valid {
             Ok(contents) => assert_eq!(contents.leaf_slots.len() + contents.instance_slots.len(), expected),
             Err(error) => panic!("the tree of {} is broken: {error}", mesh.name),
@@ -155,6 +173,8 @@ fn append(acceleration: &mut Acceleration, tree: &Tree, mesh: &mut MeshGeometry)
     acceleration.meshes.push(PreparedMesh {
         name: mesh.name.clone(),
         root_slot: written.root_slot,
+        rest_root_slot: rest_root,
+        large_leaves: large.map_or(0, |large| large.leaves() as u32),
         slots: first_slot..acceleration.slots.len() as u32,
         triangles: mesh.triangles,
         depth: written.depth,

@@ -17,6 +17,7 @@ mod geometry;
 mod ggx;
 mod instances;
 mod kept;
+mod large_faces;
 pub mod light_bvh;
 pub mod light_cone;
 mod lights;
@@ -178,6 +179,10 @@ pub struct PreparedMesh {
     pub name: String,
     /// Slot of its root.
     pub root_slot: u32,
+    /// Slot of the root above all but the large leaves, which stand before the others; the root if there are none.
+    pub rest_root_slot: u32,
+    /// Leaves so large that they stand in a tree apart: see `large_faces`.
+    pub large_leaves: u32,
     /// All of its slots, inner ones, empty ones and the world's instances among them; see [`Prepared::triangle_slots`].
     pub slots: Range<u32>,
     /// Number of triangles.
@@ -258,8 +263,10 @@ pub fn prepare_again(scene: &Scene, options: &PrepareOptions, kept: &Kept) -> Re
     let instances = pack::prepared_instances(&acceleration);
     let meshes = std::mem::take(&mut acceleration.meshes);
     let origin = geometry.origin;
-    let (arrays, constants) =
+    let (arrays, mut constants) =
         pack::pack_arrays(geometry, acceleration, &materials, textures, environment, &lights, &features);
+    (constants.root_slot, constants.rest_root_slot) =
+        meshes.first().map_or((0, 0), |world| (world.root_slot, world.rest_root_slot));
     statistics.array_bytes = [0, 1, 2, 3, 4].map(|i: usize| (arrays[i].len() * size_of::<Texel>()) as u64);
     statistics.bvh_seconds = bvh_seconds;
     statistics.seconds = start.elapsed().as_secs_f64();

@@ -66,7 +66,6 @@ pub(super) fn pack_arrays(
     let constants = RenderConstants {
         vertices,
         vertex_texels: if has_attributes { geometry.attributes.vertices.stride() } else { 0 },
-        root_slot: acceleration.meshes.first().map_or(0, |world| world.root_slot),
         materials: append(&mut tables, &materials.records),
         textures: append(&mut tables, &textures.headers),
         lights: append(&mut tables, &lights.records),

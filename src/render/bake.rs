@@ -21,6 +21,7 @@ pub const MOST_BAKED_RECORDS: usize = 16;
 const GEOMETRY: u32 = 1;
 const MATERIALS: u32 = 2;
 const LIGHTS: u32 = 4;
+const LARGE_FACES: u32 = 8;
 
 /// The part of the kernel key.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -67,7 +68,12 @@ impl Bake {
         }
         let mut this = Self::default();
         match geometry_refused(prepared, trace) {
-            Some(reason) => this.reason = reason,
+            Some(reason) => {
+                this.reason = reason;
+                if trace == TraceBackend::Bvh {
+                    this.add_large_faces(prepared);
+                }
+            }
             None => {
                 let count = prepared.statistics.triangles;
                 this.reason = format!("{count} triangles, at most {MOST_BAKED_TRIANGLES}");
@@ -100,7 +106,8 @@ impl Bake {
 
     /// What is compiled in, for people and programs.
     pub fn report(&self, baked: Baked) -> BakeReport {
-        let names = [(GEOMETRY, "geometry"), (MATERIALS, "materials"), (LIGHTS, "lights")];
+        let names =
+            [(GEOMETRY, "geometry"), (LARGE_FACES, "large faces"), (MATERIALS, "materials"), (LIGHTS, "lights")];
         let parts = names.into_iter().filter(|(bit, _)| baked.parts & bit != 0).map(|(_, name)| name).collect();
         BakeReport { parts, reason: self.reason.clone() }
     }
@@ -120,6 +127,21 @@ impl Bake {
         self.scene.triangles = triangles(prepared);
         self.scene.lamps_only = prepared.features.lights == 1 << LIGHT_TRIANGLE;
         self.parts |= GEOMETRY;
+    }
+
+    /// Compiles in the faces that stand apart from the tree of the rest, if there are any.
+    pub fn add_large_faces(&mut self, prepared: &Prepared) {
+        let large = large_faces(prepared);
+        // Among themselves they are ordered by the distances to their planes, before the rest by interpolated ones.
+        if !large.is_empty() && extent_over_shortest_edge(&large) <= WIDEST_BAKED {
+            self.scene.triangles = large;
+            self.parts |= LARGE_FACES;
+        }
+    }
+
+    /// Whether large faces are compiled in.
+    pub fn has_large_faces(&self) -> bool {
+        self.parts & LARGE_FACES != 0
     }
 
     fn add_materials(&mut self, prepared: &Prepared) {
@@ -197,6 +219,16 @@ fn records(prepared: &Prepared, start: u32, end: u32, texels: u32) -> Vec<Vec<Te
 /// Every triangle of the scene, by its number.
 fn triangles(prepared: &Prepared) -> Vec<BakedTriangle> {
     let numbers = prepared.meshes.iter().flat_map(|mesh| prepared.triangle_slots(mesh));
+    numbers.map(|number| BakedTriangle { number, vertices: prepared.triangle(number).vertices }).collect()
+}
+
+/// Those that stand apart from the rest of the world: in its first leaves.
+fn large_faces(prepared: &Prepared) -> Vec<BakedTriangle> {
+    let Some(world) = prepared.meshes.first() else { return Vec::new() };
+    let mut leaves: Vec<u32> = prepared.triangle_slots(world).map(|number| number / 2).collect();
+    leaves.dedup();
+    let end = leaves.get(world.large_leaves as usize).copied().unwrap_or(world.slots.end);
+    let numbers = prepared.triangle_slots(world).take_while(|number| number / 2 < end);
     numbers.map(|number| BakedTriangle { number, vertices: prepared.triangle(number).vertices }).collect()
 }
 

@@ -15,7 +15,7 @@ use glam::{DAffine3, DVec3};
 use sunfleck::gpu::specialize::{bake, specialize};
 use sunfleck::gpu::{DeviceKind, TraceBackend, embedded};
 use sunfleck::render::{Bake, BindingOverride, KernelKey, Settings, prepare_scene};
-use sunfleck::scene::{Primitive, Scene};
+use sunfleck::scene::{Instance, Material, Mesh, Primitive, Scene};
 
 /// A kernel that traces by the baked search, however many triangles there are.
 fn baked(scene: &Scene) -> TestKernel {
@@ -25,8 +25,34 @@ fn baked(scene: &Scene) -> TestKernel {
     kernel
 }
 
+/// A kernel that has the large faces compiled in before the tree of the rest.
+fn with_large_faces(scene: &Scene) -> TestKernel {
+    let mut kernel = kernel(scene);
+    kernel.trace = TraceBackend::Bvh;
+    kernel.bake.add_large_faces(&kernel.prepared);
+    assert!(kernel.bake.has_large_faces());
+    kernel
+}
+
 fn one(mesh: Primitive) -> Scene {
     scene_of(vec![(mesh, vec![DAffine3::IDENTITY])])
+}
+
+/// The scene with four walls, a floor and a ceiling around it, and the camera within them.
+fn in_a_room(mut scene: Scene) -> Scene {
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 40.0);
+    let low = DVec3::splat(-20.0);
+    let material = scene.materials.len();
+    scene.materials.push(Material::lambertian("wall", [0.5; 3]));
+    let sides = [(low, x, y), (low + z, x, y), (low, y, z), (low + x, y, z), (low, z, x), (low + y, z, x)];
+    let primitives = sides.map(|(corner, a, b)| rectangle(corner, a, b, material)).to_vec();
+    scene.instances.push(Instance {
+        mesh: scene.meshes.len(),
+        object_to_world: DAffine3::IDENTITY,
+        name: String::from("room"),
+    });
+    scene.meshes.push(Mesh { name: String::from("room"), primitives });
+    scene
 }
 
 #[test]
@@ -37,6 +63,41 @@ fn hits_agree_with_brute_force() {
         let rays = random_rays(Random(31), 4096, kernel.prepared.origin);
         assert!(assert_agrees(&kernel, &rays) > rays.len() / 64);
     }
+}
+
+/// Of a cube's leaves 32 are compiled in, and the others stand in the tree: neighbours are of either kind.
+#[test]
+fn hits_of_large_faces_and_the_rest_agree_with_brute_force() {
+    let room = || (cube(4), vec![DAffine3::IDENTITY]);
+    let small = DAffine3::from_scale(DVec3::splat(0.3));
+    let shifted = DAffine3::from_translation(DVec3::X * 0.4);
+    let cases = [
+        scene_of(vec![room()]),
+        scene_of(vec![room(), (icosphere(2), vec![small])]),
+        // Two placements stay instances.
+        scene_of(vec![room(), (icosphere(2), vec![small, shifted * small])]),
+    ];
+    for scene in cases {
+        let kernel = with_large_faces(&scene);
+        let rays = random_rays(Random(32), 8192, kernel.prepared.origin);
+        assert!(assert_agrees(&kernel, &rays) > rays.len() / 64);
+    }
+}
+
+#[test]
+fn large_faces_and_the_rest_are_watertight_together() {
+    let far = DAffine3::from_translation(DVec3::new(3.0, -2.0, 500.0));
+    let turned = DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    for (mesh, place) in
+        [(cube(4), DAffine3::IDENTITY), (cube(3), turned), (cube(4), far * turned), (icosphere(2), turned)]
+    {
+        let kernel = with_large_faces(&scene_of(vec![(mesh.clone(), vec![place])]));
+        assert_watertight(&kernel, &mesh, &place, 1 << 18);
+    }
+    let kernel = with_large_faces(&one(cube(4)));
+    let mut rays = axis_parallel_rays(9, kernel.prepared.origin);
+    rays.extend(as_shadow_rays(&rays));
+    assert_end_on_unit_cube(&kernel, &rays);
 }
 
 #[test]
@@ -102,6 +163,29 @@ fn images_are_those_without() {
         let different = with.iter().zip(&without).filter(|(a, b)| differs((a, b))).count();
         println!("{name}: {different} of {} pixels differ", with.len());
         assert!(different * 200 < with.len(), "{name}: {different} of {} pixels differ", with.len());
+        assert!(with.iter().flatten().any(|c| *c > 0.0), "{name} is black");
+    }
+}
+
+/// What is met keeps its order, so large faces change no bit of an image, among alpha and instances neither: only a path that
+/// ends on an edge between two of them may go on from the other.
+#[test]
+fn large_faces_do_not_change_an_image() {
+    if gpu::device().gpu.info.kind != DeviceKind::Cpu {
+        return;
+    }
+    for name in ["alpha", "instances", "volumes"] {
+        let scene = in_a_room(scene(name));
+        let draw = |bake: bool| {
+            let settings = Settings { max_bounces: Some(4), bake, ..gpu::settings(48, 48) };
+            let mut tracer = gpu::path_tracer_on(TraceBackend::Bvh, &scene, &settings, BindingOverride::default());
+            assert_eq!(tracer.bake_report().parts.contains(&"large faces"), bake, "{name}");
+            gpu::run(&mut tracer, 5, 1).film.radiance()
+        };
+        let (with, without) = (draw(true), draw(false));
+        let different = with.iter().zip(&without).filter(|(a, b)| a != b).count();
+        println!("{name}: {different} of {} pixels differ", with.len());
+        assert!(different * 500 < with.len(), "{name}: {different} of {} pixels differ", with.len());
         assert!(with.iter().flatten().any(|c| *c > 0.0), "{name} is black");
     }
 }

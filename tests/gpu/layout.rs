@@ -128,14 +128,12 @@ fn reflect() -> Blocks {
 }
 
 fn render_constants_fields() -> Vec<Field> {
-    let mut fields = rust_fields!(RenderConstants: camera_origin, lens_radius, camera_right, focus_distance, camera_up, projection,
+    rust_fields!(RenderConstants: camera_origin, lens_radius, camera_right, focus_distance, camera_up, projection,
         camera_forward, vertex_texels, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
         materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
         environment_height, environment_marginal_word, environment_conditional_word, ggx_albedo, environment_radiance,
         environment_cos, scene_center, environment_sin, light_bvh, light_bvh_counts, near_lights, clamp_indirect,
-        zero, environment_rgbe, unused);
-    split(&mut fields, "unused", &["_0", "_1"], "u32");
-    fields
+        zero, environment_rgbe, rest_root_slot, unused)
 }
 
 #[test]

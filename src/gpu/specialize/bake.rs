@@ -14,7 +14,7 @@ use super::search::{RayIds, Search, emit_search};
 /// What of a scene is compiled in.
 #[derive(Clone, Debug, Default, PartialEq, Hash)]
 pub struct BakedScene {
-    /// All triangles; none if geometry is not compiled in.
+    /// All triangles, or the large ones alone; none if no geometry is compiled in.
     pub triangles: Vec<BakedTriangle>,
     /// Every shadow ray ends on a triangle of the scene. It then crosses no plane that has all of the scene on one side.
     pub lamps_only: bool,

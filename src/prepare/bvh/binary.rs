@@ -29,7 +29,13 @@ impl Primitive {
         Self { min: bounds.min.extend(f32::from_bits(index)), max: bounds.max.extend(0.0) }
     }
 
-    fn index(&self) -> u32 {
+    /// Its box.
+    pub fn bounds(&self) -> Bounds {
+        Bounds { min: self.min.xyz(), max: self.max.xyz() }
+    }
+
+    /// Its number.
+    pub fn index(&self) -> u32 {
         self.min.w.to_bits()
     }
 

@@ -85,4 +85,18 @@ impl Tree {
     pub fn append(&self, slots: &mut Vec<Slot>, leaf: impl FnMut(u32, u32) -> Slot) -> Result<Appended, PrepareError> {
         wide::append(slots, &self.nodes, leaf)
     }
+
+    /// Appends two trees that are not empty below one root, this one first. Returns what both became together, and the slot
+    /// of the other's root, below which it is whole.
+    ///
+    /// # Errors
+    /// Those of [`Tree::append`].
+    pub fn append_beside(
+        &self,
+        other: &Self,
+        slots: &mut Vec<Slot>,
+        leaf: impl FnMut(u32, u32) -> Slot,
+    ) -> Result<(Appended, u32), PrepareError> {
+        wide::append_two(slots, [&self.nodes, &other.nodes], leaf)
+    }
 }

@@ -58,8 +58,9 @@ struct Walk<'a> {
 impl Walk<'_> {
     /// Exact bounds of what is below an inner slot. Recursion ends at [`MAX_DEPTH`].
     fn inner(&mut self, place: u32, slot: &InnerSlot, depth: u32) -> Result<Bounds, String> {
-        // The binary root's depth is 0, the wide root's is 1 and a lone leaf still has a root above it.
-        if depth > MAX_DEPTH + 1 {
+        // The binary root's depth is 0, the wide root's is 1, a lone leaf still has a root above it, and two trees may have one
+        // above both.
+        if depth > MAX_DEPTH + 2 {
             return Err(format!("slot {place} is deeper than {MAX_DEPTH}"));
         }
         self.contents.depth = self.contents.depth.max(depth);

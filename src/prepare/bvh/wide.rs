@@ -47,10 +47,41 @@ pub fn triangles_in(slot: &Slot) -> u32 {
 pub(super) fn append(
     slots: &mut Vec<Slot>,
     nodes: &[Node],
+    leaf: impl FnMut(u32, u32) -> Slot,
+) -> Result<Appended, PrepareError> {
+    let root = allocate_group(slots)? * SLOT_GROUP;
+    append_at(slots, root, nodes, leaf)
+}
+
+/// Appends two trees below one root, the first before the second.
+pub(super) fn append_two(
+    slots: &mut Vec<Slot>,
+    trees: [&[Node]; 2],
+    mut leaf: impl FnMut(u32, u32) -> Slot,
+) -> Result<(Appended, u32), PrepareError> {
+    let root_slot = allocate_group(slots)? * SLOT_GROUP;
+    let group = allocate_group(slots)?;
+    let boxes = trees.map(|nodes| nodes[0].bounds());
+    slots[root_slot as usize] = bytemuck::cast(inner_slot(&boxes, group));
+    let mut whole = Appended { root_slot, depth: 0, inner_slots: 1, sah_cost: 1.0 };
+    let area = f64::from(boxes[0].union(boxes[1]).half_area());
+    for ((nodes, bounds), place) in trees.iter().zip(boxes).zip(group * SLOT_GROUP..) {
+        let one = append_at(slots, place, nodes, &mut leaf)?;
+        whole.depth = whole.depth.max(one.depth + 1);
+        whole.inner_slots += one.inner_slots;
+        whole.sah_cost += one.sah_cost * if area > 0.0 { f64::from(bounds.half_area()) / area } else { 0.0 };
+    }
+    Ok((whole, group * SLOT_GROUP + 1))
+}
+
+/// The same with a root whose place is there already.
+pub(super) fn append_at(
+    slots: &mut Vec<Slot>,
+    root: u32,
+    nodes: &[Node],
     mut leaf: impl FnMut(u32, u32) -> Slot,
 ) -> Result<Appended, PrepareError> {
     let choices = choose(nodes);
-    let root = allocate_group(slots)? * SLOT_GROUP;
     // Inner nodes whose slot is allocated but not written yet.
     let mut pending = vec![(0u32, root, 1u32)];
     let mut appended = Appended { root_slot: root, depth: 0, inner_slots: 0, sah_cost: 1.0 };
