@@ -68,15 +68,16 @@ pub(super) fn build(
     let first_instance = primitives.len() as u32;
     primitives.extend((first_instance..).zip(&acceleration.instance_bounds).map(|(i, b)| Primitive::new(i, b)));
     let large = large_faces::choose(&geometry.world.leaves, &primitives);
-    let large = (!large.is_empty()).then(|| {
-        let is_large = |primitive: &Primitive| large.binary_search(&primitive.index()).is_ok();
-        let (apart, others) = primitives.iter().partition(|primitive| is_large(primitive));
-        primitives = others;
+    let is_large = |primitive: &Primitive| large.binary_search(&primitive.index()).is_ok();
+    let (mut apart, rest) =
+        if large.is_empty() { (Vec::new(), primitives) } else { primitives.into_iter().partition(is_large) };
+    let rest = kept.tree(rest, quality);
+    let around = (!apart.is_empty()).then(|| {
+        apart.push(Primitive::new(bvh::NESTED, &rest.bounds()));
         kept.tree(apart, quality)
     });
-    let tree = kept.tree(primitives, quality);
-    acceleration.bounds = tree.bounds().union(large.as_ref().map_or(Bounds::EMPTY, |large| large.bounds()));
-    append(&mut acceleration, large.as_deref(), &tree, &mut geometry.world)?;
+    acceleration.bounds = around.as_ref().unwrap_or(&rest).bounds();
+    append(&mut acceleration, around.as_deref(), &rest, &mut geometry.world)?;
     for (tree, mesh) in trees.iter().zip(&mut geometry.shared) {
         append(&mut acceleration, None, tree, &mut mesh.geometry)?;
     }
@@ -127,10 +128,11 @@ fn place_instances(
     Ok(())
 }
 
-/// Writes a tree behind what is there, of what is not among the large leaves: leaves of `mesh`, and beyond them instances.
+/// Writes a tree behind what is there: leaves of `mesh`, and beyond them instances. The tree of the large leaves stands around
+/// it, if there are any.
 fn append(
     acceleration: &mut Acceleration,
-    large: Option<&Tree>,
+    around: Option<&Tree>,
     tree: &Tree,
     mesh: &mut MeshGeometry,
 ) -> Result<(), PrepareError> {
@@ -158,13 +160,14 @@ fn append(
         bytemuck::cast(leaf.slot)
     };
     let slots = &mut acceleration.slots;
-    let (written, rest_root) = match large {
+    let (written, rest_root) = match around {
         None => tree.append(slots, leaf).map(|written| (written, written.root_slot))?,
-        Some(large) => large.append_beside(tree, slots, leaf)?,
+        Some(around) => around.append_around(tree, slots, leaf)?,
     };
+    let large_leaves = around.map_or(0, |around| around.leaves() - 1);
     if cfg!(debug_assertions) {
         let valid = bvh::validate(&acceleration.slots, written.root_slot, &acceleration.instance_bounds);
-        let expected = tree.leaves() + large.map_or(0, Tree::leaves);
+        let expected = tree.leaves() + large_leaves;
         match valid {
             Ok(contents) => assert_eq!(contents.leaf_slots.len() + contents.instance_slots.len(), expected),
             Err(error) => panic!("the tree of {} is broken: {error}", mesh.name),
@@ -174,7 +177,7 @@ fn append(
         name: mesh.name.clone(),
         root_slot: written.root_slot,
         rest_root_slot: rest_root,
-        large_leaves: large.map_or(0, |large| large.leaves() as u32),
+        large_leaves: large_leaves as u32,
         slots: first_slot..acceleration.slots.len() as u32,
         triangles: mesh.triangles,
         depth: written.depth,

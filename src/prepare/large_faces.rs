@@ -1,6 +1,6 @@
 //! Which leaves of the world are so large that nearly every ray has to do with them: the walls of a room, the ground that
-//! things stand on. They have a tree of their own beside that of the rest, so that a kernel that has them compiled in
-//! searches the rest alone.
+//! things stand on. They have a tree of their own, in which that of the rest has the place of a leaf: a kernel that has them
+//! compiled in searches the rest alone, the others all.
 
 use super::attributes::Leaf;
 use super::bounds::Bounds;
@@ -8,7 +8,7 @@ use super::bvh::Primitive;
 use crate::layout::TRIANGLE_ALPHA;
 
 /// Most leaves that are apart.
-const MOST_LARGE_LEAVES: usize = 32;
+pub(super) const MOST_LARGE_LEAVES: usize = 32;
 /// Least share of the scene's surface area that a leaf's box has.
 const LEAST_SHARE: f64 = 1.0 / 128.0;
 /// What testing a leaf that is compiled in costs, in visits to a slot of the tree (docs/benchmarks).

@@ -10,7 +10,7 @@ mod wide;
 pub use binary::{MAX_DEPTH, Primitive};
 pub use quantise::{decode, inner_slot, is_present};
 pub use validate::{TreeContents, validate};
-pub use wide::{Appended, GROUP_BITS, Slot, empty_slot, triangles_in};
+pub use wide::{Appended, GROUP_BITS, NESTED, Slot, empty_slot, triangles_in};
 
 use super::PrepareError;
 use super::bounds::Bounds;
@@ -83,20 +83,20 @@ impl Tree {
     /// # Errors
     /// If there are more groups than [`GROUP_BITS`] can number.
     pub fn append(&self, slots: &mut Vec<Slot>, leaf: impl FnMut(u32, u32) -> Slot) -> Result<Appended, PrepareError> {
-        wide::append(slots, &self.nodes, leaf)
+        Ok(wide::append(slots, &self.nodes, None, leaf)?.0)
     }
 
-    /// Appends two trees that are not empty below one root, this one first. Returns what both became together, and the slot
-    /// of the other's root, below which it is whole.
+    /// The same with another tree in the place of the primitive [`NESTED`], behind all of this one. Returns the slot of the
+    /// other's root too.
     ///
     /// # Errors
     /// Those of [`Tree::append`].
-    pub fn append_beside(
+    pub fn append_around(
         &self,
-        other: &Self,
+        nested: &Self,
         slots: &mut Vec<Slot>,
         leaf: impl FnMut(u32, u32) -> Slot,
     ) -> Result<(Appended, u32), PrepareError> {
-        wide::append_two(slots, [&self.nodes, &other.nodes], leaf)
+        wide::append(slots, &self.nodes, Some(&nested.nodes), leaf)
     }
 }

@@ -15,6 +15,9 @@ pub type Slot = [Texel; 3];
 /// Traversal packs a group index and the ordered list of its children into one word; this many bits are the index.
 pub const GROUP_BITS: u32 = 25;
 
+/// The primitive in whose place another tree stands; no tree has so many.
+pub const NESTED: u32 = u32::MAX;
+
 /// What a tree became.
 #[derive(Clone, Copy, Debug)]
 pub struct Appended {
@@ -43,74 +46,51 @@ pub fn triangles_in(slot: &Slot) -> u32 {
 }
 
 /// Appends a tree to `slots`: a group that holds only the root, which is always an inner slot, then the others.
-/// `leaf` makes the slot of a primitive and is told where it will be.
+/// `leaf` makes the slot of a primitive and is told where it will be. In place of the primitive [`NESTED`] stands the tree
+/// `nested`, behind all of the other. Returns the slot of its root too, which without one is that of the whole.
 pub(super) fn append(
     slots: &mut Vec<Slot>,
     nodes: &[Node],
-    leaf: impl FnMut(u32, u32) -> Slot,
-) -> Result<Appended, PrepareError> {
-    let root = allocate_group(slots)? * SLOT_GROUP;
-    append_at(slots, root, nodes, leaf)
-}
-
-/// Appends two trees below one root, the first before the second.
-pub(super) fn append_two(
-    slots: &mut Vec<Slot>,
-    trees: [&[Node]; 2],
+    nested: Option<&[Node]>,
     mut leaf: impl FnMut(u32, u32) -> Slot,
 ) -> Result<(Appended, u32), PrepareError> {
     let root_slot = allocate_group(slots)? * SLOT_GROUP;
-    let group = allocate_group(slots)?;
-    let boxes = trees.map(|nodes| nodes[0].bounds());
-    slots[root_slot as usize] = bytemuck::cast(inner_slot(&boxes, group));
-    let mut whole = Appended { root_slot, depth: 0, inner_slots: 1, sah_cost: 1.0 };
-    let area = f64::from(boxes[0].union(boxes[1]).half_area());
-    for ((nodes, bounds), place) in trees.iter().zip(boxes).zip(group * SLOT_GROUP..) {
-        let one = append_at(slots, place, nodes, &mut leaf)?;
-        whole.depth = whole.depth.max(one.depth + 1);
-        whole.inner_slots += one.inner_slots;
-        whole.sah_cost += one.sah_cost * if area > 0.0 { f64::from(bounds.half_area()) / area } else { 0.0 };
-    }
-    Ok((whole, group * SLOT_GROUP + 1))
-}
-
-/// The same with a root whose place is there already.
-pub(super) fn append_at(
-    slots: &mut Vec<Slot>,
-    root: u32,
-    nodes: &[Node],
-    mut leaf: impl FnMut(u32, u32) -> Slot,
-) -> Result<Appended, PrepareError> {
-    let choices = choose(nodes);
-    // Inner nodes whose slot is allocated but not written yet.
-    let mut pending = vec![(0u32, root, 1u32)];
-    let mut appended = Appended { root_slot: root, depth: 0, inner_slots: 0, sah_cost: 1.0 };
+    let mut appended = Appended { root_slot, depth: 0, inner_slots: 0, sah_cost: 1.0 };
     let root_area = nodes.first().map_or(0.0, |root| f64::from(root.half_area()));
     let relative_area = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
-    while let Some((node, slot, depth)) = pending.pop() {
-        appended.inner_slots += 1;
-        appended.depth = appended.depth.max(depth);
-        let (children, count) = wide_children(nodes, &choices, node);
-        let children = &children[..count];
-        let group = allocate_group(slots)?;
-        let mut boxes = [Bounds::EMPTY; SLOT_GROUP as usize];
-        for (index, &child) in children.iter().enumerate() {
-            boxes[index] = nodes[child as usize].bounds();
-        }
-        slots[slot as usize] = bytemuck::cast(inner_slot(&boxes[..count], group));
-        // In reverse, so that the first child's subtree comes next to its parent.
-        for (index, &child) in children.iter().enumerate().rev() {
-            let place = group * SLOT_GROUP + index as u32;
-            let node = &nodes[child as usize];
-            appended.sah_cost += f64::from(node.half_area()) * relative_area;
-            if node.is_leaf() {
-                slots[place as usize] = leaf(node.right_or_primitive, place);
-            } else {
-                pending.push((child, place, depth + 1));
+    // Place and depth of the root of the tree that is written next.
+    let mut next = (root_slot, 1u32);
+    for nodes in [nodes].into_iter().chain(nested) {
+        let choices = choose(nodes);
+        // Inner nodes whose slot is allocated but not written yet.
+        let mut pending = vec![(0u32, next.0, next.1)];
+        while let Some((node, slot, depth)) = pending.pop() {
+            appended.inner_slots += 1;
+            appended.depth = appended.depth.max(depth);
+            let (children, count) = wide_children(nodes, &choices, node);
+            let children = &children[..count];
+            let group = allocate_group(slots)?;
+            let mut boxes = [Bounds::EMPTY; SLOT_GROUP as usize];
+            for (index, &child) in children.iter().enumerate() {
+                boxes[index] = nodes[child as usize].bounds();
+            }
+            slots[slot as usize] = bytemuck::cast(inner_slot(&boxes[..count], group));
+            // In reverse, so that the first child's subtree comes next to its parent.
+            for (index, &child) in children.iter().enumerate().rev() {
+                let place = group * SLOT_GROUP + index as u32;
+                let node = &nodes[child as usize];
+                appended.sah_cost += f64::from(node.half_area()) * relative_area;
+                if !node.is_leaf() {
+                    pending.push((child, place, depth + 1));
+                } else if node.right_or_primitive == NESTED {
+                    next = (place, depth + 1);
+                } else {
+                    slots[place as usize] = leaf(node.right_or_primitive, place);
+                }
             }
         }
     }
-    Ok(appended)
+    Ok((appended, next.0))
 }
 
 fn allocate_group(slots: &mut Vec<Slot>) -> Result<u32, PrepareError> {
