@@ -68,10 +68,11 @@ pub(super) fn build(
     let first_instance = primitives.len() as u32;
     primitives.extend((first_instance..).zip(&acceleration.instance_bounds).map(|(i, b)| Primitive::new(i, b)));
     let large = large_faces::choose(&geometry.world.leaves, &primitives);
-    let is_large = |primitive: &Primitive| large.binary_search(&primitive.index()).is_ok();
-    let (mut apart, rest) =
-        if large.is_empty() { (Vec::new(), primitives) } else { primitives.into_iter().partition(is_large) };
-    let rest = kept.tree(rest, quality);
+    let mut apart: Vec<Primitive> = large.iter().map(|&index| primitives[index as usize]).collect();
+    if !large.is_empty() {
+        primitives.retain(|primitive| large.binary_search(&primitive.index()).is_err());
+    }
+    let rest = kept.tree(primitives, quality);
     let around = (!apart.is_empty()).then(|| {
         apart.push(Primitive::new(bvh::NESTED, &rest.bounds()));
         kept.tree(apart, quality)
