@@ -161,10 +161,10 @@ fn append(
         bytemuck::cast(leaf.slot)
     };
     let slots = &mut acceleration.slots;
-    let (written, rest_root) = match around {
-        None => tree.append(slots, leaf).map(|written| (written, written.root_slot))?,
-        Some(around) => around.append_around(tree, slots, leaf)?,
-    };
+    let written = match around {
+        None => tree.append(slots, leaf),
+        Some(around) => around.append_around(tree, slots, leaf),
+    }?;
     let large_leaves = around.map_or(0, |around| around.leaves() - 1);
     if cfg!(debug_assertions) {
         let valid = bvh::validate(&acceleration.slots, written.root_slot, &acceleration.instance_bounds);
@@ -177,7 +177,7 @@ fn append(
     acceleration.meshes.push(PreparedMesh {
         name: mesh.name.clone(),
         root_slot: written.root_slot,
-        rest_root_slot: rest_root,
+        rest_root_slot: written.nested_root_slot,
         large_leaves: large_leaves as u32,
         slots: first_slot..acceleration.slots.len() as u32,
         triangles: mesh.triangles,

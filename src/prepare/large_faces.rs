@@ -4,11 +4,9 @@
 
 use super::attributes::Leaf;
 use super::bounds::Bounds;
-use super::bvh::Primitive;
+use super::bvh::{MOST_AROUND, Primitive};
 use crate::layout::TRIANGLE_ALPHA;
 
-/// Most leaves that are apart.
-pub(super) const MOST_LARGE_LEAVES: usize = 32;
 /// Least share of the scene's surface area that a leaf's box has.
 const LEAST_SHARE: f64 = 1.0 / 128.0;
 /// What testing a leaf that is compiled in costs, in visits to a slot of the tree (docs/benchmarks).
@@ -30,13 +28,12 @@ pub(super) fn choose(leaves: &[Leaf], primitives: &[Primitive]) -> Vec<u32> {
     let mut large: Vec<(f64, u32)> = leaves
         .iter()
         .zip(primitives)
-        .zip(0..)
-        .map(|((leaf, primitive), index)| (leaf, share(primitive), index))
-        .filter(|(leaf, share, _)| *share >= LEAST_SHARE && leaf.first.kind & TRIANGLE_ALPHA == 0)
-        .map(|(_, share, index)| (share, index))
+        .filter(|(leaf, _)| leaf.first.kind & TRIANGLE_ALPHA == 0)
+        .map(|(_, primitive)| (share(primitive), primitive.index()))
+        .filter(|(share, _)| *share >= LEAST_SHARE)
         .collect();
     large.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    large.truncate(MOST_LARGE_LEAVES);
+    large.truncate(MOST_AROUND);
     let saved: f64 = large.iter().map(|(share, _)| share + NODES_A_LEAF - TEST_COST).sum();
     // With nothing beside them there is no tree to be smaller.
     if saved <= FIXED_COST || large.len() == primitives.len() {
@@ -78,7 +75,7 @@ mod tests {
     fn there_is_something_beside_them_and_they_are_not_too_many() {
         assert_eq!(chosen(&[leaf(1.0, 0.0, 0), leaf(1.0, 1.0, 0), leaf(1.0, 2.0, 0)]), [] as [u32; 0]);
         let many: Vec<Leaf> = (0..40).map(|i| leaf(1.0, 0.01 * i as f32, 0)).collect();
-        assert_eq!(chosen(&many).len(), MOST_LARGE_LEAVES);
+        assert_eq!(chosen(&many).len(), MOST_AROUND);
         assert_eq!(chosen(&[]), [] as [u32; 0]);
     }
 }

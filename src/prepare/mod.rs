@@ -281,7 +281,17 @@ fn luminance([r, g, b]: [f32; 3]) -> f64 {
 impl Prepared {
     /// Numbers of a mesh's triangles (see [`LeafSlot`]), ascending.
     pub fn triangle_slots<'a>(&'a self, mesh: &PreparedMesh) -> impl Iterator<Item = u32> + use<'a> {
-        mesh.slots.clone().flat_map(|slot| (0..bvh::triangles_in(&self.slot(slot))).map(move |k| 2 * slot + k))
+        self.triangles_in(mesh.slots.clone())
+    }
+
+    /// Numbers of the triangles in a mesh's large leaves, ascending.
+    pub fn large_triangle_slots<'a>(&'a self, mesh: &PreparedMesh) -> impl Iterator<Item = u32> + use<'a> {
+        let leaves = mesh.slots.clone().filter(|&slot| bvh::triangles_in(&self.slot(slot)) > 0);
+        self.triangles_in(leaves.take(mesh.large_leaves as usize))
+    }
+
+    fn triangles_in(&self, slots: impl Iterator<Item = u32>) -> impl Iterator<Item = u32> {
+        slots.flat_map(|slot| (0..bvh::triangles_in(&self.slot(slot))).map(move |k| 2 * slot + k))
     }
 
     fn slot(&self, slot: u32) -> bvh::Slot {

@@ -218,17 +218,15 @@ fn records(prepared: &Prepared, start: u32, end: u32, texels: u32) -> Vec<Vec<Te
 
 /// Every triangle of the scene, by its number.
 fn triangles(prepared: &Prepared) -> Vec<BakedTriangle> {
-    let numbers = prepared.meshes.iter().flat_map(|mesh| prepared.triangle_slots(mesh));
-    numbers.map(|number| BakedTriangle { number, vertices: prepared.triangle(number).vertices }).collect()
+    baked(prepared, prepared.meshes.iter().flat_map(|mesh| prepared.triangle_slots(mesh)))
 }
 
-/// Those that stand apart from the rest of the world: in its first leaves.
+/// Those that stand apart from the rest of the world.
 fn large_faces(prepared: &Prepared) -> Vec<BakedTriangle> {
-    let Some(world) = prepared.meshes.first() else { return Vec::new() };
-    let mut leaves: Vec<u32> = prepared.triangle_slots(world).map(|number| number / 2).collect();
-    leaves.dedup();
-    let end = leaves.get(world.large_leaves as usize).copied().unwrap_or(world.slots.end);
-    let numbers = prepared.triangle_slots(world).take_while(|number| number / 2 < end);
+    baked(prepared, prepared.meshes.first().into_iter().flat_map(|world| prepared.large_triangle_slots(world)))
+}
+
+fn baked(prepared: &Prepared, numbers: impl Iterator<Item = u32>) -> Vec<BakedTriangle> {
     numbers.map(|number| BakedTriangle { number, vertices: prepared.triangle(number).vertices }).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use crate::prepare_support::*;
 use glam::{DAffine3, DVec3, Vec3};
-use sunfleck::layout::{InnerSlot, LeafSlot, SceneArray};
+use sunfleck::layout::{InnerSlot, LeafSlot};
 use sunfleck::prepare::bounds::Bounds;
 use sunfleck::prepare::bvh::{self, BvhQuality, MAX_DEPTH, Primitive, Slot, Tree, decode, inner_slot, validate};
 use sunfleck::prepare::{PrepareOptions, Prepared, prepare};
@@ -175,16 +175,10 @@ fn depth_is_bounded_for_exponentially_spaced_triangles() {
     assert!(contents.depth <= MAX_DEPTH);
 }
 
-/// Slots of a prepared scene.
-fn slots_of(prepared: &Prepared) -> Vec<Slot> {
-    prepared.arrays[SceneArray::Slots as usize].chunks_exact(3).map(|slot| [slot[0], slot[1], slot[2]]).collect()
-}
-
 #[test]
 fn walls_stand_apart_from_the_rest_and_in_the_whole() {
-    let scene = load::resolve("bumpy").unwrap();
-    let prepared = prepare(&scene, &PrepareOptions::default()).unwrap();
-    let (world, slots) = (&prepared.meshes[0], slots_of(&prepared));
+    let prepared = prepared(&load::resolve("bumpy").unwrap());
+    let (world, slots) = (&prepared.meshes[0], slots(&prepared));
     // Five walls and the lamp.
     assert_eq!(world.large_leaves, 6);
     let [whole, rest] = [world.root_slot, world.rest_root_slot].map(|root| validate(&slots, root, &[]).unwrap());
@@ -194,8 +188,9 @@ fn walls_stand_apart_from_the_rest_and_in_the_whole() {
     leaves.iter_mut().for_each(|leaves| leaves.sort_unstable());
     // The large ones come first.
     assert_eq!(leaves[0][6..], leaves[1]);
-    let prepared = prepare(&load::resolve("cornell").unwrap(), &PrepareOptions::default()).unwrap();
-    assert_eq!(prepared.constants.rest_root_slot, prepared.meshes[0].rest_root_slot);
+    let constants = &prepared.constants;
+    assert_eq!((constants.root_slot, constants.rest_root_slot), (world.root_slot, world.rest_root_slot));
+    assert_ne!(world.root_slot, world.rest_root_slot);
 }
 
 #[test]

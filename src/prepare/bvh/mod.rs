@@ -10,7 +10,7 @@ mod wide;
 pub use binary::{MAX_DEPTH, Primitive};
 pub use quantise::{decode, inner_slot, is_present};
 pub use validate::{TreeContents, validate};
-pub use wide::{Appended, GROUP_BITS, NESTED, Slot, empty_slot, triangles_in};
+pub use wide::{Appended, GROUP_BITS, MOST_AROUND, NESTED, Slot, empty_slot, triangles_in};
 
 use super::PrepareError;
 use super::bounds::Bounds;
@@ -83,11 +83,10 @@ impl Tree {
     /// # Errors
     /// If there are more groups than [`GROUP_BITS`] can number.
     pub fn append(&self, slots: &mut Vec<Slot>, leaf: impl FnMut(u32, u32) -> Slot) -> Result<Appended, PrepareError> {
-        Ok(wide::append(slots, &self.nodes, None, leaf)?.0)
+        wide::append(slots, &self.nodes, None, leaf)
     }
 
-    /// The same with another tree in the place of the primitive [`NESTED`], behind all of this one. Returns the slot of the
-    /// other's root too.
+    /// The same with another tree in the place of the primitive [`NESTED`], behind all of this one.
     ///
     /// # Errors
     /// Those of [`Tree::append`].
@@ -96,7 +95,7 @@ impl Tree {
         nested: &Self,
         slots: &mut Vec<Slot>,
         leaf: impl FnMut(u32, u32) -> Slot,
-    ) -> Result<(Appended, u32), PrepareError> {
+    ) -> Result<Appended, PrepareError> {
         wide::append(slots, &self.nodes, Some(&nested.nodes), leaf)
     }
 }

@@ -2,10 +2,9 @@
 
 use super::binary::MAX_DEPTH;
 use super::quantise::{compare_sum, decode, is_present};
-use super::wide::{Slot, empty_slot};
+use super::wide::{MOST_AROUND, Slot, empty_slot};
 use crate::layout::{InnerSlot, InstanceSlot, LeafSlot, SLOT_GROUP, SLOT_INNER, SLOT_INSTANCE, SLOT_NO_LEAF};
 use crate::prepare::bounds::Bounds;
-use crate::prepare::large_faces::MOST_LARGE_LEAVES;
 
 /// What a valid tree holds.
 #[derive(Clone, Debug, Default)]
@@ -61,7 +60,7 @@ impl Walk<'_> {
     fn inner(&mut self, place: u32, slot: &InnerSlot, depth: u32) -> Result<Bounds, String> {
         // The binary root's depth is 0, the wide root's is 1, a lone leaf still has a root above it, and a tree of a few large
         // leaves may stand around the other.
-        if depth > MAX_DEPTH + 1 + MOST_LARGE_LEAVES as u32 {
+        if depth > MAX_DEPTH + 1 + MOST_AROUND as u32 {
             return Err(format!("slot {place} is deeper than {MAX_DEPTH}"));
         }
         self.contents.depth = self.contents.depth.max(depth);

@@ -18,11 +18,16 @@ pub const GROUP_BITS: u32 = 25;
 /// The primitive in whose place another tree stands; no tree has so many.
 pub const NESTED: u32 = u32::MAX;
 
+/// Most primitives beside [`NESTED`] in a tree around another, which is no deeper than that.
+pub const MOST_AROUND: usize = 32;
+
 /// What a tree became.
 #[derive(Clone, Copy, Debug)]
 pub struct Appended {
     /// Slot of the root.
     pub root_slot: u32,
+    /// Slot of the root of the tree in it; without one, the root.
+    pub nested_root_slot: u32,
     /// Inner slots on the longest path, 1 or more.
     pub depth: u32,
     /// Number of inner slots.
@@ -47,23 +52,22 @@ pub fn triangles_in(slot: &Slot) -> u32 {
 
 /// Appends a tree to `slots`: a group that holds only the root, which is always an inner slot, then the others.
 /// `leaf` makes the slot of a primitive and is told where it will be. In place of the primitive [`NESTED`] stands the tree
-/// `nested`, behind all of the other. Returns the slot of its root too, which without one is that of the whole.
+/// `nested`, behind all of the other.
 pub(super) fn append(
     slots: &mut Vec<Slot>,
     nodes: &[Node],
     nested: Option<&[Node]>,
     mut leaf: impl FnMut(u32, u32) -> Slot,
-) -> Result<(Appended, u32), PrepareError> {
+) -> Result<Appended, PrepareError> {
     let root_slot = allocate_group(slots)? * SLOT_GROUP;
-    let mut appended = Appended { root_slot, depth: 0, inner_slots: 0, sah_cost: 1.0 };
+    let mut appended = Appended { root_slot, nested_root_slot: root_slot, depth: 0, inner_slots: 0, sah_cost: 1.0 };
     let root_area = nodes.first().map_or(0.0, |root| f64::from(root.half_area()));
     let relative_area = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
-    // Place and depth of the root of the tree that is written next.
-    let mut next = (root_slot, 1u32);
+    let mut root_depth = 1u32;
     for nodes in [nodes].into_iter().chain(nested) {
         let choices = choose(nodes);
         // Inner nodes whose slot is allocated but not written yet.
-        let mut pending = vec![(0u32, next.0, next.1)];
+        let mut pending = vec![(0u32, appended.nested_root_slot, root_depth)];
         while let Some((node, slot, depth)) = pending.pop() {
             appended.inner_slots += 1;
             appended.depth = appended.depth.max(depth);
@@ -83,14 +87,14 @@ pub(super) fn append(
                 if !node.is_leaf() {
                     pending.push((child, place, depth + 1));
                 } else if node.right_or_primitive == NESTED {
-                    next = (place, depth + 1);
+                    (appended.nested_root_slot, root_depth) = (place, depth + 1);
                 } else {
                     slots[place as usize] = leaf(node.right_or_primitive, place);
                 }
             }
         }
     }
-    Ok((appended, next.0))
+    Ok(appended)
 }
 
 fn allocate_group(slots: &mut Vec<Slot>) -> Result<u32, PrepareError> {
