@@ -72,21 +72,38 @@ const uint BOUNCE_CAP = 65535u;
 SampleKey sample_key(LaneState lane) { return SampleKey(lane.pixel, lane.sample_index, constants.seed); }
 // A shadow ray that may pass panes looks for the nearest surface, as a path's ray does.
 bool is_shadow_ray(LaneState lane) { return lane.ray.any_hit || (HAS_PANES && lane.pane_search != 0u); }
-uvec2 alpha_key(LaneState lane) { return alpha_key(sample_key(lane), lane.bounce, is_shadow_ray(lane)); }
+uvec2 alpha_key(LaneState lane) {
+    if (HAS_ALPHA && is_emission_ray(lane)) return emission_alpha_key(lane, sample_key(lane));
+    return alpha_key(sample_key(lane), lane.bounce, is_shadow_ray(lane));
+}
 
-void start_sample(inout LaneState lane) {
+// Begins at the camera: `bits` are the place in the pixel and on the lens.
+void start_path(inout LaneState lane, uvec4 bits) {
     lane.bounce = 0u;
-    lane.radiance = vec3(0.0);
-    lane.throughput = vec3(1.0);
     lane.radiance_scale = 1.0;
     lane.pdf = 0.0;
     lane.emission_weight = WEIGHT_FULL;
     lane.passed = 0.0;
     if (HAS_VOLUME) lane.media = OUTSIDE;
-    vec4 u = to_unit(sample_bits(sample_key(lane), 0u, DIMENSIONS_FILM));
-    CameraRay camera = camera_ray(constants, uvec2(lane.pixel & 0xffffu, lane.pixel >> 16u), u);
+    CameraRay camera = camera_ray(constants, uvec2(lane.pixel & 0xffffu, lane.pixel >> 16u), to_unit(bits));
     if (HAS_MIP) lane.cone = camera_cone(constants, camera.direction);
     lane.ray = Ray(camera.origin, camera.direction, INFINITY, false, NO_TRIANGLE, NO_TRIANGLE);
+}
+
+void start_sample(inout LaneState lane) {
+    lane.radiance = vec3(0.0);
+    lane.throughput = vec3(1.0);
+    lane.emission_ray = 0u;
+    start_path(lane, sample_bits(sample_key(lane), 0u, DIMENSIONS_FILM));
+}
+
+// Begins the sample's next emission ray, after its path; false if there is none.
+bool start_emission_ray(inout LaneState lane) {
+    if (lane.emission_ray >= lane.emission_rays) return false;
+    lane.emission_ray += 1u;
+    lane.throughput = vec3(1.0 / float(lane.emission_rays));
+    start_path(lane, emission_ray_bits(lane, sample_key(lane)));
+    return true;
 }
 
 // Scaled down to a largest component of `most`, in its own colour. Biased: only --clamp-indirect asks for it. A NaN stays,
@@ -99,7 +116,7 @@ vec3 clamp_light(vec3 light, float most) {
 // Adds the light found after `bounce` scattering events, if the integrator counts them.
 void add_radiance(inout LaneState lane, uint bounce, vec3 light) {
     bool counts = bounce == 0u ? ADDS_EMISSION : (bounce == 1u ? ADDS_DIRECT : ADDS_INDIRECT);
-    if (!counts) return;
+    if (!counts || leaves_emission(lane, bounce)) return;
     if (CLAMPS_INDIRECT && bounce >= 2u) light = clamp_light(light, constants.clamp_indirect);
 #ifndef DEBUG_VIEW
     lane.radiance += light;
@@ -299,14 +316,14 @@ bool shade_surface(inout LaneState lane, Hit hit) {
     float width = HAS_MIP ? cone_width(lane.cone, hit.t) : 0.0;
     Surface surface = surface_at(constants, hit, view, lane.media, width);
     if (HAS_PANES && lane.pane_search != 0u) return passes_pane(lane, surface, hit) || finish_shadow(lane, false);
-    if (HAS_AOVS && lane.bounce == 0u) add_surface_aovs(constants, surface);
+    if (HAS_AOVS && lane.bounce == 0u && !is_emission_ray(lane)) add_surface_aovs(constants, surface);
     if (HAS_MIP) lane.cone.width = width;
     if (HAS_VOLUME) {
         lane.media = surface.near;
         lane.throughput *= transmittance(constants, lane.media, hit.t);
     }
     add_emission(lane, surface, hit);
-    if (surface.black || lane.bounce >= constants.max_bounces) return false;
+    if (surface.black || is_emission_ray(lane) || lane.bounce >= constants.max_bounces) return false;
     if (lane.bounce >= BOUNCE_CAP) {
         lane.capped |= 1u << (lane.sample_index % BLOCK_SAMPLES);
         return false;
@@ -356,6 +373,9 @@ bool start_next(inout LaneState lane) {
 // The path goes on with its next ray, or the sample is finished.
 void follow_path(inout LaneState lane, bool goes_on) {
     if (!SAMPLE_ENDS(!goes_on)) return;
+#ifndef DEBUG_VIEW
+    if (HAS_EMISSION_RAYS && start_emission_ray(lane)) return;
+#endif
     finish_sample(lane);
     lane.has_path = 0u;
 }

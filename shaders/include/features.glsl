@@ -41,6 +41,7 @@ const bool HAS_PANES = (FEATURES & 262144u) != 0u;
 // but uniforms that takes much code away makes lavapipe copy and optimise the whole kernel anew at every dispatch.
 const bool FOR_ANY_SCENE = (FEATURES & 524288u) != 0u;
 const bool HAS_RGBE_ENVIRONMENT = (FEATURES & 1048576u) != 0u;
+const bool HAS_EMISSION_RAYS = (FEATURES & 2097152u) != 0u;
 
 // Whether triangles have records with vertices, or only their kinds.
 const bool HAS_ATTRIBUTES = HAS_NORMALS || HAS_TEXTURES || HAS_NORMAL_MAPS || HAS_ANISOTROPY || HAS_VERTEX_COLORS;

@@ -41,6 +41,8 @@ struct LaneState {
     uint atom;             // of the slice, NONE if the lane has none
     uint ray_limit;        // rays of the atom at which the lane waits for the next dispatch
     uint has_path;         // 0 between samples
+    uint emission_rays;    // of each sample of the atom; 0: its path adds what it sees without scattering itself
+    uint emission_ray;     // the number of the emission ray that the lane traces; 0: the path
 };
 
 // Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
@@ -87,6 +89,8 @@ LaneState idle_lane() {
     lane.atom = NONE;
     lane.ray_limit = 0u;
     lane.has_path = 0u;
+    lane.emission_rays = 0u;
+    lane.emission_ray = 0u;
     return lane;
 }
 

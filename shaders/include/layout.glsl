@@ -115,7 +115,7 @@ struct RenderConstants {
     float zero;
     uint environment_rgbe;
     uint rest_root_slot;
-    uint unused;
+    uint emission_rays;
 };
 
 struct SliceConstants {

@@ -2,6 +2,7 @@
 // which path_trace.comp includes.
 #ifndef QUEUE_GLSL
 #define QUEUE_GLSL
+#include "emission_rays.glsl"
 #include "lane.glsl"
 
 // Rounds of loops that a lane, and so its vector, may have run before it takes no further atom, and before it waits for the next
@@ -75,7 +76,10 @@ bool take_atom(inout LaneState lane) {
         if (atom >= slice.atoms) break;
         begin_atom(lane, constants, slice, atom);
         if (HAS_EXTRAS) begin_extras();
-        if (lane.sample_index < lane.end_sample) return true;
+        if (lane.sample_index < lane.end_sample) {
+            if (HAS_EMISSION_RAYS) begin_emission_rays(lane, constants);
+            return true;
+        }
         finish_atom(lane);
     }
     lane.atom = NONE;

@@ -12,6 +12,8 @@ const uint DIMENSIONS_SCATTER = 2u;  // lobe; direction u, v; roulette
 const uint DIMENSIONS_LIGHT = 3u;    // which light and position u; digits below that; position v; which strategy (mixture)
 const uint DIMENSIONS_ENVIRONMENT = 4u;  // row; column; position u, v under the texel's tent
 const uint DIMENSIONS_ALPHA = 5u;    // decisions about alpha: key of the path's ray; key of the shadow ray
+const uint DIMENSIONS_EMISSION = 6u;  // emission rays: x, y in the pixel; lens u, v
+const uint DIMENSIONS_EMISSION_ALPHA = 7u;  // decisions about alpha along them: key; two in reserve
 const uint DIMENSION_GROUPS = 8u;
 
 struct SampleKey {
@@ -46,8 +48,9 @@ uvec4 hashed_bits(SampleKey key, uint bounce, uint group) {
 }
 
 // The same as two Sobol' pairs, each in an order of its own (padding: PBR, 4th ed., §8.6.3). What belongs together is a
-// pair: of scattering the two in the middle, of lights the first and the third, and what is left.
-uvec4 sobol_bits(SampleKey key, uint bounce, uint group) {
+// pair: of scattering the two in the middle, of lights the first and the third, and what is left. A sample of `parts` has
+// that many points of the sequence.
+uvec4 sobol_bits(SampleKey key, uint parts, uint part, uint bounce, uint group) {
     uint x = key.pixel & 0xffffu;
     uint y = key.pixel >> 16u;
     uint replicate = 0u;
@@ -57,6 +60,7 @@ uvec4 sobol_bits(SampleKey key, uint bounce, uint group) {
         replicate = 1u + block % SOBOL_REPLICATES;
         key.index = block / SOBOL_REPLICATES * SOBOL_BLOCK + key.index % SOBOL_BLOCK;
     }
+    key.index = key.index * parts + part;
     uint tile = x >> SOBOL_TILE | y >> SOBOL_TILE << 16u;
     uint z = morton(x & ((1u << SOBOL_TILE) - 1u), y & ((1u << SOBOL_TILE) - 1u));
     uvec4 a = pcg4d(uvec4(tile, replicate, bounce * DIMENSION_GROUPS + group, key.seed));
@@ -70,7 +74,14 @@ uvec4 sobol_bits(SampleKey key, uint bounce, uint group) {
 
 // Four 32-bit values of a group of dimensions at a bounce.
 uvec4 sample_bits(SampleKey key, uint bounce, uint group) {
-    return SAMPLER == SAMPLER_INDEPENDENT ? hashed_bits(key, bounce, group) : sobol_bits(key, bounce, group);
+    return SAMPLER == SAMPLER_INDEPENDENT ? hashed_bits(key, bounce, group) : sobol_bits(key, 1u, 0u, bounce, group);
+}
+
+// The same for one of several rays of a sample that do the same, at bounce 0. Up to 2^32 / parts samples no two are alike.
+uvec4 sample_part_bits(SampleKey key, uint parts, uint part, uint group) {
+    if (SAMPLER != SAMPLER_INDEPENDENT) return sobol_bits(key, parts, part, 0u, group);
+    key.index = key.index * parts + part;
+    return hashed_bits(key, 0u, group);
 }
 
 // [0, 1), in steps of 2^-24.

@@ -41,6 +41,10 @@ pub(crate) struct EstimatorArgs {
     /// image is too dark wherever it acts. Reports and images say so.
     #[arg(long, value_name = "X", value_parser = parse::positive_f32, help_heading = "Light transport")]
     clamp_indirect: Option<f32>,
+    /// Camera rays that ask for emission alone, N for each sample of the pixels in which a lamp may be seen: smoother edges of
+    /// lamps for little time; 0 is none [default: a power of two up to 8, by how few these pixels are].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=256), help_heading = "Light transport")]
+    emission_rays: Option<u32>,
     /// Look up every texture in the file's own texels; without it, those of colours and roughness in mip chains, by ray
     /// cones that are a quarter of a pixel wide and widen at each scattering event.
     #[arg(long, help_heading = "Light transport")]
@@ -102,6 +106,9 @@ impl EstimatorArgs {
         if let Some(most) = self.clamp_indirect {
             add("clamp-indirect", most.to_string());
         }
+        if let Some(rays) = self.emission_rays {
+            add("emission-rays", rays.to_string());
+        }
         if let Some(sampling) = self.env_sampling {
             add("env-sampling", sampling.to_string());
         }
@@ -162,6 +169,7 @@ impl EstimatorArgs {
         settings.mip = !self.no_mip;
         settings.bake = !self.no_bake;
         settings.clamp_indirect = self.clamp_indirect;
+        settings.emission_rays = self.emission_rays;
         settings.trace = self.trace;
         settings.bvh_quality = self.bvh_quality;
         settings.device = self.device;

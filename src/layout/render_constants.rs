@@ -89,6 +89,6 @@ pub struct RenderConstants {
     pub environment_rgbe: u32,
     /// Slot at which traversal starts when the large faces are compiled in (src/prepare/large_faces.rs).
     pub rest_root_slot: u32,
-    /// Unused, zero.
-    pub unused: u32,
+    /// Emission rays of a sample, in the pixels that are picked for them (src/render/emission_pixels.rs).
+    pub emission_rays: u32,
 }

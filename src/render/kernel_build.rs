@@ -3,14 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use ash::vk::BufferUsageFlags as Usage;
+
 use super::bake::{Bake, BakeReport};
+use super::emission_pixels::EmissionPixels;
 use super::kernel_key::KernelKey;
 use super::scene_buffers::{SceneBuffers, array_binding};
 use super::slices::Slice;
 use super::{Integrator, Settings};
 use crate::film::aov::Aov;
 use crate::gpu::{
-    ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, TraceBackend, embedded, shader_compiler,
+    ArrayForm, BindingResource, Buffer, Gpu, Kernel, KernelDescription, MemoryUse, TraceBackend, embedded,
+    shader_compiler,
 };
 use crate::layout::{RenderConstants, SliceConstants};
 use crate::prepare::{Prepared, camera_constants};
@@ -55,11 +59,17 @@ pub(super) fn effective_max_bounces(settings: &Settings) -> u32 {
 }
 
 /// The constants of a scene, a camera and settings; seed and samples come later.
-pub(super) fn scene_constants(prepared: &Prepared, camera: &Camera, settings: &Settings) -> RenderConstants {
+pub(super) fn scene_constants(
+    prepared: &Prepared,
+    camera: &Camera,
+    settings: &Settings,
+    emission: &EmissionPixels,
+) -> RenderConstants {
     let mut constants = prepared.constants;
     camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
     constants.max_bounces = effective_max_bounces(settings);
     constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
+    constants.emission_rays = emission.rays;
     constants
 }
 
@@ -83,11 +93,11 @@ pub(super) fn build_kernel(
     spirv: &[u32],
     overrides: BindingOverride,
     buffers: &SceneBuffers,
-    constants: &Buffer,
+    view: &ViewBuffers,
     slices: &[Slice],
 ) -> Result<Kernel> {
     let workgroup_size = overrides.workgroup_size.unwrap_or(64).min(gpu.info.limits.workgroup_invocations);
-    let kernel = with_sets(key, buffers, constants, slices, |sets| {
+    let kernel = with_sets(key, buffers, view, slices, |sets| {
         Kernel::new(
             gpu,
             &KernelDescription {
@@ -104,11 +114,33 @@ pub(super) fn build_kernel(
     Ok(kernel?)
 }
 
+/// What depends on the camera and the film.
+pub(super) struct ViewBuffers {
+    /// [`RenderConstants`].
+    pub(super) constants: Buffer,
+    /// A bit a pixel, if the kernel has emission rays.
+    pub(super) emission_pixels: Option<Buffer>,
+}
+
+impl ViewBuffers {
+    pub(super) fn new(gpu: &Arc<Gpu>, emission: &EmissionPixels) -> Result<Self> {
+        let bytes = size_of::<RenderConstants>() as u64;
+        Ok(Self {
+            constants: Buffer::new(gpu, "render constants", bytes, Usage::UNIFORM_BUFFER, MemoryUse::Upload)?,
+            emission_pixels: emission.upload(gpu)?,
+        })
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        self.constants.size + self.emission_pixels.as_ref().map_or(0, |pixels| pixels.size)
+    }
+}
+
 /// Does something with what is bound: a set for each slice.
 pub(super) fn with_sets<T>(
     key: &KernelKey,
     buffers: &SceneBuffers,
-    constants: &Buffer,
+    view: &ViewBuffers,
     slices: &[Slice],
     work: impl FnOnce(&[&[(u32, BindingResource<'_>)]]) -> T,
 ) -> T {
@@ -119,7 +151,7 @@ pub(super) fn with_sets<T>(
         .map(|slice| {
             // What the kernel does not keep it does not declare, unless the driver specialises it: then it does not use it.
             let mut set = vec![
-                (0, BindingResource::Uniform(constants)),
+                (0, BindingResource::Uniform(&view.constants)),
                 (1, BindingResource::Storage(&slice.results)),
                 (2, BindingResource::Storage(&slice.lane_states)),
                 (3, array_binding),
@@ -128,6 +160,7 @@ pub(super) fn with_sets<T>(
             set.push((5, BindingResource::Storage(slice.aovs.as_ref().unwrap_or(&slice.results))));
             set.push((6, BindingResource::Storage(slice.counters.as_ref().unwrap_or(&slice.results))));
             set.push((7, BindingResource::Storage(&slice.queue)));
+            set.push((8, BindingResource::Storage(view.emission_pixels.as_ref().unwrap_or(&slice.results))));
             set
         })
         .collect();

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::bake::Baked;
+use super::emission_pixels::EmissionPixels;
 use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, RunPlan, SamplerKind, Settings};
 use crate::film::aov::Aov;
 use crate::gpu::{ArrayForm, TraceBackend};
@@ -50,6 +51,8 @@ pub struct KernelKey {
     pub aovs: u32,
     /// Rays and their searches are counted.
     pub statistics: bool,
+    /// Some pixels have rays for emission alone.
+    pub emission_rays: bool,
 }
 
 fn aov_bit(aov: Aov) -> u32 {
@@ -91,6 +94,7 @@ impl KernelKey {
             env_sampling: settings.environment_sampling(),
             aovs: settings.aovs.iter().fold(0, |bits, &aov| bits | aov_bit(aov)),
             statistics: settings.statistics,
+            emission_rays: EmissionPixels::choose(prepared, camera, settings).rays > 0,
         }
     }
 
@@ -103,7 +107,8 @@ impl KernelKey {
     pub fn kept(&self) -> Vec<String> {
         let features = self.features.kept().into_iter().map(str::to_owned);
         let aovs = self.aovs().into_iter().map(|aov| format!("aov-{aov}"));
-        features.chain(aovs).chain(self.statistics.then(|| String::from("statistics"))).collect()
+        let rays = self.emission_rays.then(|| String::from("emission-rays"));
+        features.chain(rays).chain(aovs).chain(self.statistics.then(|| String::from("statistics"))).collect()
     }
 
     /// The specialisation constants of shaders/include/features.glsl.
@@ -132,6 +137,7 @@ impl KernelKey {
             // FOR_ANY_SCENE: it is for this one.
             false,
             f.environment_rgbe,
+            self.emission_rays,
         ];
         let features = flags.iter().zip(0..).fold(0, |bits, (&on, i)| bits | u32::from(on) << i);
         let integrator = match self.integrator {

@@ -2,6 +2,7 @@
 
 mod bake;
 mod calibrate;
+mod emission_pixels;
 mod function_kernel;
 mod kernel_build;
 mod kernel_key;

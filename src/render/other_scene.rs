@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::bake::BakeReport;
-use super::kernel_build::{BindingOverride, baked_spirv, scene_constants, with_sets};
+use super::emission_pixels::EmissionPixels;
+use super::kernel_build::{BindingOverride, ViewBuffers, baked_spirv, scene_constants, with_sets};
 use super::kernel_key::KernelKey;
 use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::{PathTracer, Settings};
@@ -17,6 +18,7 @@ use crate::scene::Camera;
 /// A scene on the device of a tracer, whose kernel is the one that it takes.
 pub struct OtherScene {
     pub(super) buffers: Arc<SceneBuffers>,
+    pub(super) view: ViewBuffers,
     pub(super) constants: RenderConstants,
     pub(super) origin: DVec3,
     pub(super) bake: BakeReport,
@@ -43,8 +45,10 @@ impl OtherScene {
             return Ok(None);
         }
         let buffers = Arc::new(SceneBuffers::upload(&beside.gpu, prepared, beside.trace, form)?);
-        let constants = scene_constants(prepared, camera, settings);
-        Ok(Some(Self { buffers, constants, origin: prepared.origin, bake }))
+        let emission = EmissionPixels::choose(prepared, camera, settings);
+        let constants = scene_constants(prepared, camera, settings, &emission);
+        let view = ViewBuffers::new(&beside.gpu, &emission)?;
+        Ok(Some(Self { buffers, view, constants, origin: prepared.origin, bake }))
     }
 }
 
@@ -55,7 +59,8 @@ impl PathTracer {
     /// When memory runs out.
     pub fn take_scene(&mut self, other: OtherScene) -> Result<()> {
         let kernel = &mut self.kernel;
-        with_sets(&self.key, &other.buffers, &self.constants_buffer, &self.slices, |sets| kernel.rebind(sets))?;
+        with_sets(&self.key, &other.buffers, &other.view, &self.slices, |sets| kernel.rebind(sets))?;
+        self.view = other.view;
         self.constants = other.constants;
         self.origin = other.origin;
         self.buffers = other.buffers;

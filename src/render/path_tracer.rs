@@ -5,12 +5,12 @@ use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use ash::vk::BufferUsageFlags as Usage;
 use glam::DVec3;
 
 use super::bake::BakeReport;
+use super::emission_pixels::EmissionPixels;
 use super::kernel_build::{
-    BindingOverride, baked_spirv, build_kernel, check_aovs, effective_max_bounces, scene_constants,
+    BindingOverride, ViewBuffers, baked_spirv, build_kernel, check_aovs, effective_max_bounces, scene_constants,
 };
 use super::kernel_key::KernelKey;
 use super::looks::Looks;
@@ -20,7 +20,7 @@ use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
 use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
-use crate::gpu::{Buffer, Gpu, Kernel, MemoryUse, TraceBackend};
+use crate::gpu::{Gpu, Kernel, TraceBackend};
 use crate::layout::RenderConstants;
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
@@ -33,7 +33,7 @@ pub struct PathTracer {
     pub(super) constants: RenderConstants,
     /// Where rebased space has its zero.
     pub(super) origin: DVec3,
-    pub(super) constants_buffer: Buffer,
+    pub(super) view: ViewBuffers,
     pub(super) slices: Vec<Slice>,
     pub(super) sizes: SliceSizes,
     pub(super) buffers: Arc<SceneBuffers>,
@@ -106,20 +106,15 @@ impl PathTracer {
         overrides: BindingOverride,
     ) -> Result<Self> {
         let gpu = &buffers.gpu;
-        let constants = scene_constants(prepared, camera, settings);
-        let constants_buffer = Buffer::new(
-            gpu,
-            "render constants",
-            size_of::<RenderConstants>() as u64,
-            Usage::UNIFORM_BUFFER,
-            MemoryUse::Upload,
-        )?;
+        let emission = EmissionPixels::choose(prepared, camera, settings);
+        let constants = scene_constants(prepared, camera, settings, &emission);
+        let view = ViewBuffers::new(gpu, &emission)?;
         let slice_atoms = overrides.slice_atoms.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
         let mut key = KernelKey::new(prepared, camera, settings, buffers.trace, buffers.form);
         let mut slices = new_slices(gpu, slice_atoms, &key)?;
         let start = Instant::now();
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
-        let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &constants_buffer, &slices)?;
+        let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &view, &slices)?;
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
         let sizes = SliceSizes::new(overrides, slices[0].atoms());
@@ -128,7 +123,7 @@ impl PathTracer {
             kernel,
             constants,
             origin: prepared.origin,
-            constants_buffer,
+            view,
             slices,
             sizes,
             buffers,
@@ -165,14 +160,17 @@ impl PathTracer {
             .then(|| new_slices(gpu, self.slices[0].atoms(), &key))
             .transpose()?;
         let slices = others.as_ref().unwrap_or(&self.slices);
-        let kernel = build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &self.constants_buffer, slices)?;
+        let emission = EmissionPixels::choose(prepared, camera, settings);
+        let view = ViewBuffers::new(gpu, &emission)?;
+        let kernel = build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &view, slices)?;
         others.as_mut().unwrap_or(&mut self.slices)[0].warm_up(&kernel)?;
-        (self.key, self.kernel, self.bake) = (key, kernel, bake);
+        (self.key, self.kernel, self.bake, self.view) = (key, kernel, bake, view);
         if let Some(slices) = others {
             self.slices = slices;
         }
         self.forget_sizes();
         self.constants.max_bounces = effective_max_bounces(settings);
+        self.constants.emission_rays = emission.rays;
         self.constants.clamp_indirect = settings.clamp_indirect.unwrap_or(0.0);
         self.compile_seconds = start.elapsed().as_secs_f64();
         Ok(())
@@ -188,14 +186,16 @@ impl PathTracer {
         KernelKey::new(prepared, camera, settings, self.buffers.trace, self.buffers.form)
     }
 
-    /// Looks through another camera of the same kind (lens, projection), on a film of another size.
+    /// Looks through another camera of the same kind (lens, projection), on a film of another size. Emission rays were for
+    /// the pixels of the one before: there are none from then on.
     pub fn look_through(&mut self, camera: &Camera, origin: DVec3, width: u32, height: u32) {
         camera_constants(camera, origin, width, height, &mut self.constants);
+        self.constants.emission_rays = 0;
     }
 
     /// Bytes of device memory in use.
     pub fn gpu_bytes(&self) -> u64 {
-        self.buffers.bytes + self.slices.iter().map(Slice::bytes).sum::<u64>() + self.constants_buffer.size
+        self.buffers.bytes + self.slices.iter().map(Slice::bytes).sum::<u64>() + self.view.bytes()
     }
 
     /// Renders a range of sample indices of every pixel.
@@ -261,7 +261,7 @@ impl PathTracer {
         limits: &Limits,
         progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
     ) -> Result<()> {
-        self.constants_buffer.write(&[self.constants])?;
+        self.view.constants.write(&[self.constants])?;
         self.sizes.begin(self.constants.end_sample - self.constants.first_sample);
         let mut schedule = Schedule::new(&self.constants);
         let mut in_flight = VecDeque::new();

@@ -24,7 +24,7 @@ impl PathTracer {
     /// When the device is lost.
     pub fn prints(&mut self, seed: u32, (x, y): (u32, u32), sample: u32) -> Result<Vec<Printed>> {
         (self.constants.seed, self.constants.first_sample, self.constants.end_sample) = (seed, sample, sample + 1);
-        self.constants_buffer.write(&[self.constants])?;
+        self.view.constants.write(&[self.constants])?;
         let push = SliceConstants {
             first_atom: index_of_pixel(&self.constants, x, y),
             lanes: 1,

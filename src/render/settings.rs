@@ -46,6 +46,9 @@ pub struct Settings {
     /// Most that a path may bring at once after two scattering events or more (largest component), > 0. It takes light
     /// away from the image: a bias.
     pub clamp_indirect: Option<f32>,
+    /// Rays of a sample that ask for emission alone, in pixels where the camera may see a lamp; 0 is none, `None` as many as
+    /// cost little ([`super::emission_pixels`]).
+    pub emission_rays: Option<u32>,
     /// How [`LightSampling::Mis`] weighs its two samples.
     pub mis_heuristic: MisHeuristic,
     /// How directions to an image environment are chosen; `None` leaves it to [`Settings::environment_sampling`].
@@ -94,6 +97,7 @@ impl Default for Settings {
             light_sampling: LightSampling::default(),
             light_choice: LightChoice::default(),
             clamp_indirect: None,
+            emission_rays: None,
             mis_heuristic: MisHeuristic::default(),
             env_sampling: None,
             filter: PixelFilter::default(),

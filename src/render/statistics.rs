@@ -9,7 +9,7 @@ use crate::layout::RayCounters;
 /// Counters of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
-    /// Rays that the camera sends: one a sample.
+    /// Rays that the camera sends: one a sample, and emission rays.
     pub camera: RayCount,
     /// Rays that go on from a surface.
     pub scattered: RayCount,

@@ -133,7 +133,7 @@ fn render_constants_fields() -> Vec<Field> {
         materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
         environment_height, environment_marginal_word, environment_conditional_word, ggx_albedo, environment_radiance,
         environment_cos, scene_center, environment_sin, light_bvh, light_bvh_counts, near_lights, clamp_indirect,
-        zero, environment_rgbe, rest_root_slot, unused)
+        zero, environment_rgbe, rest_root_slot, emission_rays)
 }
 
 #[test]

@@ -20,6 +20,7 @@ mod debug_shaders;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod dispatches;
+mod emission_rays;
 mod environment_chi_square;
 mod error_estimate;
 mod furnace;

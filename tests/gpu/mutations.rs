@@ -127,6 +127,10 @@ mutations! {
     light_behind_panes_twice: "path_trace.comp",
         "if (HAS_PANES && (scattered.flags & STRAIGHT) == STRAIGHT && bsdf_is_pane(surface.bsdf)) {" => "if (false) {",
         caught by "panes::ways_to_look_for_light_agree_behind_panes";
+    /// What the camera sees of lamps is counted by paths and by emission rays.
+    lamps_counted_twice: "include/emission_rays.glsl",
+        "return HAS_EMISSION_RAYS && bounce == 0u &&" => "return HAS_EMISSION_RAYS && bounce == 1u &&",
+        caught by "emission_rays::what_the_camera_sees_keeps_its_mean";
     /// Panes take nothing of the light that light samples bring.
     panes_without_absorption: "path_trace.comp",
         "lane.shadow_light *= pane_transmittance(surface.bsdf);" => "",

@@ -25,7 +25,7 @@ pub(crate) enum Along {
 const STREAMS: [Along; 5] = [Along::Samples, Along::PixelsInRow, Along::PixelsInColumn, Along::Bounces, Along::Seeds];
 
 /// Groups as in rng.glsl.
-const GROUPS: u32 = 6;
+const GROUPS: u32 = 8;
 
 /// The kernel's two input texels for key `i` of a stream.
 fn key(along: Along, group: u32, i: u32) -> [[u32; 4]; 2] {

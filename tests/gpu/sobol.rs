@@ -11,8 +11,8 @@ use super::sampler::{Along, dimension_p_values, pair_p_values};
 const SAMPLER: u32 = 10;
 const SOBOL: u32 = 1;
 const REPLICATES: u32 = 2;
-/// Groups of rng.glsl that are made of pairs: film, time, scatter, light, environment.
-const GROUPS: [u32; 5] = [0, 1, 2, 3, 4];
+/// Groups of rng.glsl that are made of pairs: film, time, scatter, light, environment, emission.
+const GROUPS: [u32; 6] = [0, 1, 2, 3, 4, 6];
 /// Width of a tile.
 const TILE: u32 = 32;
 

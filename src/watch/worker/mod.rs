@@ -42,7 +42,9 @@ enum Incoming {
 ///
 /// # Errors
 /// No device, a scene that is bad at the start, a lost device.
-pub fn run(settings: Settings, load: LoadScene, tev: Option<&str>) -> Result<()> {
+pub fn run(mut settings: Settings, load: LoadScene, tev: Option<&str>) -> Result<()> {
+    // Their pixels would move with the camera.
+    settings.emission_rays = Some(0);
     let (send, inbox) = channel();
     let done = send.clone();
     std::thread::spawn(move || listen(&send));
