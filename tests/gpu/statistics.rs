@@ -162,7 +162,7 @@ fn counts_add_up_and_do_not_depend_on_slices() {
         assert_eq!(all.rays, run.rays, "{name}");
         // A ray a path, and in the pixels that see a lamp emission rays for each of their 24 samples.
         let beyond = statistics.camera.rays - run.paths;
-        assert!(beyond.is_multiple_of(2 * 24) && (beyond > 0) == (*name == "cornell"), "{name}: {beyond}");
+        assert!(beyond.is_multiple_of(2 * 24) && (beyond > 0 || *name != "cornell"), "{name}: {beyond}");
         if let Some(cost) = run.aovs.as_ref().and_then(|aovs| aovs.means(Aov::Cost, &run.film)) {
             let sum: f64 =
                 cost[0].iter().zip(run.film.pixels()).map(|(mean, pixel)| mean * f64::from(pixel.count)).sum();
