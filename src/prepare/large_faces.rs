@@ -7,8 +7,6 @@ use super::bounds::Bounds;
 use super::bvh::{MOST_AROUND, Primitive};
 use crate::layout::TRIANGLE_ALPHA;
 
-/// Least share of the scene's surface area that a leaf's box has.
-const LEAST_SHARE: f64 = 1.0 / 128.0;
 /// What testing a leaf that is compiled in costs, in visits to a slot of the tree (docs/benchmarks).
 const TEST_COST: f64 = 0.15;
 /// What it costs a ray that there are any, likewise.
@@ -16,12 +14,18 @@ const FIXED_COST: f64 = 1.2;
 /// Nodes above a leaf that there are for it: a node of four children makes four of one.
 const NODES_A_LEAF: f64 = 1.0 / 3.0;
 
+/// Visits that a ray does not make for a leaf that is compiled in, less what testing it costs. The nodes above a leaf are at
+/// least as large as it is; of the walls of a box, which have a third of its surface area each, as large as the scene.
+fn saved(share: f64) -> f64 {
+    share + NODES_A_LEAF * (3.0 * share).min(1.0) - TEST_COST
+}
+
 /// Indices of the leaves that are apart, ascending; none if that would not pay. `primitives` are the boxes of all leaves and,
 /// behind them, of what else is in the world's tree.
 ///
 /// A random line through the scene's box meets a box in it by its share of the surface area (`MacDonald` and Booth 1990, "Heuristics
 /// for ray tracing using space subdivision"). So that many visits does a leaf cost in the tree, beside those to the nodes
-/// above it, which are about as large as the scene where leaves are walls.
+/// above it.
 pub(super) fn choose(leaves: &[Leaf], primitives: &[Primitive]) -> Vec<u32> {
     let scene = primitives.iter().fold(Bounds::EMPTY, |bounds, primitive| bounds.union(primitive.bounds()));
     let share = |primitive: &Primitive| f64::from(primitive.bounds().half_area()) / f64::from(scene.half_area());
@@ -30,11 +34,11 @@ pub(super) fn choose(leaves: &[Leaf], primitives: &[Primitive]) -> Vec<u32> {
         .zip(primitives)
         .filter(|(leaf, _)| leaf.first.kind & TRIANGLE_ALPHA == 0)
         .map(|(_, primitive)| (share(primitive), primitive.index()))
-        .filter(|(share, _)| *share >= LEAST_SHARE)
+        .filter(|(share, _)| saved(*share) > 0.0)
         .collect();
     large.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     large.truncate(MOST_AROUND);
-    let saved: f64 = large.iter().map(|(share, _)| share + NODES_A_LEAF - TEST_COST).sum();
+    let saved: f64 = large.iter().map(|(share, _)| saved(*share)).sum();
     // With nothing beside them there is no tree to be smaller.
     if saved <= FIXED_COST || large.len() == primitives.len() {
         return Vec::new();
@@ -69,6 +73,15 @@ mod tests {
         leaves.push(leaf(0.9, 0.3, 0));
         assert_eq!(chosen(&leaves), [1, 3, 4]);
         assert_eq!(chosen(&leaves[..2]), [] as [u32; 0], "a ground alone does not pay");
+    }
+
+    /// A model's large faces are in no ray's way but of those near it; the tree finds that out for less than they cost.
+    #[test]
+    fn faces_of_a_model_are_not_walls() {
+        let mut leaves: Vec<Leaf> = (0..30).map(|i| leaf(0.2, 0.03 * i as f32, 0)).collect();
+        leaves.push(leaf(0.01, 1.0, 0));
+        leaves.push(leaf(1.0, 0.0, 0));
+        assert_eq!(chosen(&leaves), [] as [u32; 0]);
     }
 
     #[test]
