@@ -3,7 +3,6 @@
 use std::fmt;
 
 use super::bake::Baked;
-use super::emission_pixels::EmissionPixels;
 use super::{EnvironmentSampling, Integrator, LightSampling, MisHeuristic, RunPlan, SamplerKind, Settings};
 use crate::film::aov::Aov;
 use crate::gpu::{ArrayForm, TraceBackend};
@@ -51,7 +50,7 @@ pub struct KernelKey {
     pub aovs: u32,
     /// Rays and their searches are counted.
     pub statistics: bool,
-    /// Some pixels have rays for emission alone.
+    /// Some pixels have rays for emission alone. As what is compiled in, it is decided where the kernel is built.
     pub emission_rays: bool,
 }
 
@@ -94,7 +93,7 @@ impl KernelKey {
             env_sampling: settings.environment_sampling(),
             aovs: settings.aovs.iter().fold(0, |bits, &aov| bits | aov_bit(aov)),
             statistics: settings.statistics,
-            emission_rays: EmissionPixels::choose(prepared, camera, settings).rays > 0,
+            emission_rays: false,
         }
     }
 

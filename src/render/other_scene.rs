@@ -39,13 +39,14 @@ impl OtherScene {
     ) -> Result<Option<Self>> {
         let lengths: Vec<usize> = prepared.arrays.iter().map(Vec::len).collect();
         let form = overrides.array_form.map_or_else(|| choose_array_form(&beside.gpu.info, &lengths), Ok)?;
+        let emission = EmissionPixels::choose(prepared, camera, settings);
         let mut its_key = KernelKey::new(prepared, camera, settings, beside.trace, form);
+        its_key.emission_rays = emission.rays > 0;
         let (_, bake) = baked_spirv(&beside.gpu, prepared, settings, overrides, &mut its_key)?;
         if its_key != *key {
             return Ok(None);
         }
         let buffers = Arc::new(SceneBuffers::upload(&beside.gpu, prepared, beside.trace, form)?);
-        let emission = EmissionPixels::choose(prepared, camera, settings);
         let constants = scene_constants(prepared, camera, settings, &emission);
         let view = ViewBuffers::new(&beside.gpu, &emission)?;
         Ok(Some(Self { buffers, view, constants, origin: prepared.origin, bake }))

@@ -111,6 +111,7 @@ impl PathTracer {
         let view = ViewBuffers::new(gpu, &emission)?;
         let slice_atoms = overrides.slice_atoms.unwrap_or_else(|| SliceSizes::largest(gpu.info.kind));
         let mut key = KernelKey::new(prepared, camera, settings, buffers.trace, buffers.form);
+        key.emission_rays = emission.rays > 0;
         let mut slices = new_slices(gpu, slice_atoms, &key)?;
         let start = Instant::now();
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, overrides, &mut key)?;
@@ -154,13 +155,14 @@ impl PathTracer {
         let start = Instant::now();
         let gpu = &self.buffers.gpu;
         let mut key = self.key_for(prepared, camera, settings);
+        let emission = EmissionPixels::choose(prepared, camera, settings);
+        key.emission_rays = emission.rays > 0;
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
         // Other sums lie in other buffers.
         let mut others = ((key.aovs, key.statistics) != (self.key.aovs, self.key.statistics))
             .then(|| new_slices(gpu, self.slices[0].atoms(), &key))
             .transpose()?;
         let slices = others.as_ref().unwrap_or(&self.slices);
-        let emission = EmissionPixels::choose(prepared, camera, settings);
         let view = ViewBuffers::new(gpu, &emission)?;
         let kernel = build_kernel(gpu, &key, &spirv, self.overrides, &self.buffers, &view, slices)?;
         others.as_mut().unwrap_or(&mut self.slices)[0].warm_up(&kernel)?;
@@ -181,7 +183,7 @@ impl PathTracer {
         self.sizes = SliceSizes::new(self.overrides, self.slices[0].atoms());
     }
 
-    /// The key of the kernel that [`PathTracer::rebuild`] would build, but for what it would compile in.
+    /// The key of the kernel that [`PathTracer::rebuild`] would build, but for what it would compile in, and emission rays.
     pub fn key_for(&self, prepared: &Prepared, camera: &Camera, settings: &Settings) -> KernelKey {
         KernelKey::new(prepared, camera, settings, self.buffers.trace, self.buffers.form)
     }

@@ -65,10 +65,18 @@ fn hits_agree_with_brute_force() {
     }
 }
 
-/// Of a cube's leaves 32 are compiled in, and the others stand in the tree: neighbours are of either kind.
+/// The cube [−1, 1]³, each face a square with a frame around it: the squares are compiled in, the frames stand in the tree.
+fn framed_cube() -> Primitive {
+    let mut mesh = cube(3);
+    for x in mesh.positions.as_flattened_mut() {
+        *x = if x.abs() < 0.5 { 0.75 * x.signum() } else { *x };
+    }
+    mesh
+}
+
 #[test]
 fn hits_of_large_faces_and_the_rest_agree_with_brute_force() {
-    let room = || (cube(4), vec![DAffine3::IDENTITY]);
+    let room = || (framed_cube(), vec![DAffine3::IDENTITY]);
     let small = DAffine3::from_scale(DVec3::splat(0.3));
     let shifted = DAffine3::from_translation(DVec3::X * 0.4);
     let cases = [
@@ -88,13 +96,12 @@ fn hits_of_large_faces_and_the_rest_agree_with_brute_force() {
 fn large_faces_and_the_rest_are_watertight_together() {
     let far = DAffine3::from_translation(DVec3::new(3.0, -2.0, 500.0));
     let turned = DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
-    for (mesh, place) in
-        [(cube(4), DAffine3::IDENTITY), (cube(3), turned), (cube(4), far * turned), (icosphere(2), turned)]
-    {
+    let mesh = framed_cube();
+    for place in [DAffine3::IDENTITY, turned, far * turned] {
         let kernel = with_large_faces(&scene_of(vec![(mesh.clone(), vec![place])]));
         assert_watertight(&kernel, &mesh, &place, 1 << 18);
     }
-    let kernel = with_large_faces(&one(cube(4)));
+    let kernel = with_large_faces(&one(mesh));
     let mut rays = axis_parallel_rays(9, kernel.prepared.origin);
     rays.extend(as_shadow_rays(&rays));
     assert_end_on_unit_cube(&kernel, &rays);

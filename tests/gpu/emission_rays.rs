@@ -58,7 +58,7 @@ fn lamps() -> Scene {
 fn mean(scene: &Scene, settings: &Settings) -> [Estimate; 3] {
     let mut tracer = gpu::path_tracer(scene, settings);
     assert_eq!(tracer.key().emission_rays, settings.emission_rays != Some(0));
-    scenes::seeds(&mut tracer, settings, 16, 16).image()
+    scenes::seeds(&mut tracer, settings, if scenes::slow_driver() { 4 } else { 16 }, 16).image()
 }
 
 /// A number of rays that is no power of two, too; by both samplers, both kinds of camera, and integrators that have them.

@@ -27,7 +27,8 @@ fn key_with(name: &str, trace: TraceBackend, form: ArrayForm, settings: &Setting
     let scene = scene(name);
     let camera = &scene.cameras[0];
     let prepared = prepare_scene(&scene, camera, settings).expect("the scene fits");
-    let key = KernelKey::new(&prepared, camera, settings, trace, (form, 31));
+    let mut key = KernelKey::new(&prepared, camera, settings, trace, (form, 31));
+    key.emission_rays = name == "cornell";
     key.specialization().into_iter().chain([(0, 64)]).collect()
 }
 
@@ -110,7 +111,8 @@ fn aovs_and_statistics_leave_nothing_behind() {
             let differs = opcodes(&mine).iter().zip(&opcodes(&plain)).position(|(a, b)| a != b);
             assert_eq!((opcodes(&mine).len(), differs), (opcodes(&plain).len(), None), "{name}, {trace}");
             let bindings = declared_bindings(&mine).expect("a module");
-            assert!(!bindings.contains(&AOV_BINDING) && !bindings.contains(&COUNTER_BINDING), "{name}: {bindings:?}");
+            let left_out = [AOV_BINDING, COUNTER_BINDING, EMISSION_BINDING];
+            assert!(left_out.iter().all(|binding| !bindings.contains(binding)), "{name}: {bindings:?}");
             assert!(!asks_for_subgroups(&mine), "{name}, {trace}");
             let settings = Settings { aovs: Aov::ALL.to_vec(), statistics: true, ..gpu::settings(16, 16) };
             let everything = key_with(name, trace, ArrayForm::TexelBuffer, &settings);
@@ -128,6 +130,7 @@ fn aovs_and_statistics_leave_nothing_behind() {
 
 const AOV_BINDING: u32 = 5;
 const COUNTER_BINDING: u32 = 6;
+const EMISSION_BINDING: u32 = 8;
 
 /// A capability (OpCapability GroupNonUniform), a built-in (SubgroupSize), or an instruction (OpGroupNonUniformElect).
 fn asks_for_subgroups(spirv: &[u32]) -> bool {
