@@ -18,10 +18,11 @@ use crate::layout::{
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 
-/// Most emission rays of a sample that are chosen without being asked for.
+/// Fewest and most emission rays of a sample that are chosen without being asked for.
+const FEWEST_RAYS: u64 = 2;
 const MOST_RAYS: u64 = 8;
-/// Emission rays a sample, as a mean over the image, are fewer than its pixels over this. Measured: docs/benchmarks.
-const PIXELS_A_RAY: u64 = 2;
+/// For so many samples of the image it has at most one emission ray that is not asked for (docs/benchmarks).
+const SAMPLES_A_RAY: u64 = 2;
 
 /// The pixels, and the rays of each of their samples.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,7 +44,7 @@ impl EmissionPixels {
         let mut constants = prepared.constants;
         camera_constants(camera, prepared.origin, settings.width, settings.height, &mut constants);
         let pixels = u64::from(settings.width) * u64::from(settings.height);
-        let most_pixels = if wanted.is_some() { pixels } else { pixels / PIXELS_A_RAY / 2 };
+        let most_pixels = if wanted.is_some() { pixels } else { pixels / SAMPLES_A_RAY / FEWEST_RAYS };
         let mut film = LampPixels::new(settings.width, settings.height);
         for polygon in lamps(prepared, &constants) {
             film.add(&polygon);
@@ -54,7 +55,7 @@ impl EmissionPixels {
         if film.count == 0 {
             return Self::default();
         }
-        let affordable = (pixels / PIXELS_A_RAY / film.count).clamp(1, MOST_RAYS);
+        let affordable = (pixels / SAMPLES_A_RAY / film.count).clamp(FEWEST_RAYS, MOST_RAYS);
         let rays = wanted.unwrap_or(1 << affordable.ilog2());
         Self { words: film.words, rays }
     }
@@ -208,6 +209,103 @@ impl LampPixels {
                 let (word, bit) = (&mut self.words[pixel / 32], 1 << (pixel % 32));
                 self.count += u64::from(*word & bit == 0);
                 *word |= bit;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DMat3};
+
+    use super::*;
+    use crate::render::prepare_scene;
+    use crate::scene::{Projection, builtin};
+
+    const SIZE: u32 = 24;
+    /// Rays along a pixel's side, at its edges too.
+    const RAYS: u32 = 9;
+
+    fn settings() -> Settings {
+        Settings { width: SIZE, height: SIZE, emission_rays: Some(1), ..Settings::default() }
+    }
+
+    /// The Cornell box from a place, looking along −z of the turned camera.
+    fn chosen_and_met(eye: DVec3, turn: DMat3, projection: Projection) -> (Vec<bool>, Vec<bool>) {
+        let scene = builtin::builtin("cornell").unwrap();
+        let mut camera = scene.cameras[0].clone();
+        camera.camera_to_world = DAffine3::from_mat3_translation(turn, eye);
+        camera.projection = projection;
+        let prepared = prepare_scene(&scene, &camera, &settings()).unwrap();
+        let words = EmissionPixels::choose(&prepared, &camera, &settings()).words;
+        let bit = |pixel: u32| words.get(pixel as usize / 32).is_some_and(|word| word >> (pixel % 32) & 1 == 1);
+        let lamp: Vec<_> = (0..2)
+            .map(|i| {
+                record::<Light>(
+                    &prepared.arrays[SceneArray::Tables as usize],
+                    prepared.constants.lights + LIGHT_TEXELS * i,
+                )
+            })
+            .map(|light| place(&prepared, &light).0)
+            .collect();
+        let mut constants = prepared.constants;
+        camera_constants(&camera, prepared.origin, SIZE, SIZE, &mut constants);
+        let meets = |x: f64, y: f64| {
+            let (origin, direction) = ray(&constants, x, y);
+            lamp.iter().any(|&triangle| meets_front(origin, direction, triangle))
+        };
+        let at = |i: u32, step: u32| f64::from(i) + f64::from(step) / f64::from(RAYS - 1);
+        let met = |pixel: u32| {
+            let steps = (0..RAYS).flat_map(|i| (0..RAYS).map(move |j| (i, j)));
+            steps.into_iter().any(|(i, j)| meets(at(pixel % SIZE, i), at(pixel / SIZE, j)))
+        };
+        ((0..SIZE * SIZE).map(bit).collect(), (0..SIZE * SIZE).map(met).collect())
+    }
+
+    /// As `camera_ray` of camera.glsl.
+    fn ray(constants: &RenderConstants, x: f64, y: f64) -> (DVec3, DVec3) {
+        let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
+        let film = DVec2::new(x, y) / f64::from(SIZE) * 2.0 - 1.0;
+        let offset = vector(constants.camera_right) * film.x - vector(constants.camera_up) * film.y;
+        let (eye, forward) = (vector(constants.camera_origin), vector(constants.camera_forward));
+        if constants.projection == PROJECTION_ORTHOGRAPHIC { (eye + offset, forward) } else { (eye, forward + offset) }
+    }
+
+    fn meets_front(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+        let normal = (b - a).cross(c - a);
+        let t = (a - origin).dot(normal) / direction.dot(normal);
+        let point = origin + direction * t;
+        let inside = |p: DVec3, q: DVec3| (q - p).cross(point - p).dot(normal) >= 0.0;
+        direction.dot(normal) < 0.0 && t > 0.0 && inside(a, b) && inside(b, c) && inside(c, a)
+    }
+
+    #[test]
+    fn the_pixels_are_those_that_see_a_lamp() {
+        let scene = builtin::builtin("cornell").unwrap();
+        let own = &scene.cameras[0];
+        let lamp_below = DVec3::new(0.1, 0.7, -0.1);
+        let up = DMat3::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        let wide = Projection::Perspective { yfov_radians: 2.4 };
+        let cases = [
+            ("from outside", own.camera_to_world.translation, own.camera_to_world.matrix3, own.projection, true),
+            ("from below", lamp_below, up, wide, true),
+            // The lamp's plane cuts the view, and a part of the lamp is behind the camera.
+            ("aslant", lamp_below, DMat3::from_rotation_x(0.9) * DMat3::from_rotation_z(0.4), wide, true),
+            ("orthographic", lamp_below, up, Projection::Orthographic { ymag: 0.7 }, true),
+            ("away", lamp_below, DMat3::from_rotation_x(-0.9), Projection::Perspective { yfov_radians: 0.5 }, false),
+            ("from above", DVec3::new(0.0, 40.0, 0.0), DMat3::from_rotation_x(-1.5), wide, false),
+        ];
+        for (name, eye, turn, projection, seen) in cases {
+            let (chosen, met) = chosen_and_met(eye, turn, projection);
+            assert_eq!(met.contains(&true), seen, "{name}");
+            let near = |pixel: usize| {
+                let (x, y) = (pixel as u32 % SIZE, pixel as u32 / SIZE);
+                let around = |v: u32| v.saturating_sub(1)..=(v + 1).min(SIZE - 1);
+                around(x).any(|x| around(y).any(|y| met[(y * SIZE + x) as usize]))
+            };
+            for pixel in 0..chosen.len() {
+                assert!(chosen[pixel] || !met[pixel], "{name}: pixel {pixel} sees the lamp and is not chosen");
+                assert!(!chosen[pixel] || near(pixel), "{name}: pixel {pixel} is chosen and far from all that do");
             }
         }
     }
