@@ -62,8 +62,9 @@ int searches_per_shading() {
     bool is_dear = HAS_TEXTURES || HAS_LIGHT_BVH || environment_is_sampled_by_texels();
     if (TRACE_BACKEND == TRACE_RAY_QUERY) return 1;
     if (is_dear) return 8;
-    // A scene without walls loses many paths to the outside: few lanes meet a surface at a time.
-    if (!BAKES_LARGE_FACES) return 4;
+    // A scene without walls loses many paths to the outside: few lanes meet a surface at a time. Where nothing is compiled in,
+    // as on GPUs, nobody has looked for walls.
+    if (BAKED != 0u && !BAKES_LARGE_FACES) return 4;
     return SAMPLER == SAMPLER_INDEPENDENT ? 1 : 2;
 }
 
