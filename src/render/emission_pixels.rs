@@ -136,22 +136,39 @@ impl Eye {
 
     /// What of a triangle is on the film.
     fn project(&self, vertices: [DVec3; 3]) -> Polygon {
-        let seen = vertices.map(|vertex| {
-            let offset = vertex - self.origin;
-            let depth = offset.dot(self.forward);
-            let w = if self.orthographic { 1.0 } else { depth };
-            (DVec3::new(offset.dot(self.across), offset.dot(self.down), w), depth)
-        });
-        let mut polygon: Vec<(DVec3, f64)> = seen.to_vec();
+        let mut polygon: Vec<Seen> = vertices.into_iter().map(|vertex| self.see(vertex)).collect();
         // Before the camera, and between the film's four edges; with these alone w ≥ 0.
-        let sides: [fn(&(DVec3, f64)) -> f64; 5] =
-            [|v| v.1, |v| v.0.z + v.0.x, |v| v.0.z - v.0.x, |v| v.0.z + v.0.y, |v| v.0.z - v.0.y];
+        let sides: [fn(&Seen) -> f64; 5] =
+            [|v| v.depth, |v| v.w + v.film.x, |v| v.w - v.film.x, |v| v.w + v.film.y, |v| v.w - v.film.y];
         for side in sides {
-            polygon = clip(&polygon, side, |a, b, t| (a.0.lerp(b.0, t), a.1 + (b.1 - a.1) * t));
+            polygon = clip(&polygon, side, Seen::between);
         }
-        let size = self.size;
-        let pixels = |v: DVec3| (v.truncate() / v.z + 1.0) * 0.5 * size;
-        polygon.into_iter().filter(|(v, _)| v.z > 0.0).map(|(v, _)| pixels(v)).collect()
+        let pixels = |v: Seen| (v.film / v.w + 1.0) * 0.5 * self.size;
+        polygon.into_iter().filter(|v| v.w > 0.0).map(pixels).collect()
+    }
+
+    fn see(&self, vertex: DVec3) -> Seen {
+        let offset = vertex - self.origin;
+        let depth = offset.dot(self.forward);
+        let film = DVec2::new(offset.dot(self.across), offset.dot(self.down));
+        Seen { film, w: if self.orthographic { 1.0 } else { depth }, depth }
+    }
+}
+
+/// A point before the camera.
+#[derive(Clone, Copy)]
+struct Seen {
+    /// Its place on the film, −1 to 1, times `w`.
+    film: DVec2,
+    w: f64,
+    /// Its distance along the viewing direction.
+    depth: f64,
+}
+
+impl Seen {
+    fn between(self, other: Self, t: f64) -> Self {
+        let mix = |a: f64, b: f64| a + (b - a) * t;
+        Self { film: self.film.lerp(other.film, t), w: mix(self.w, other.w), depth: mix(self.depth, other.depth) }
     }
 }
 

@@ -47,7 +47,7 @@ pub struct Settings {
     /// away from the image: a bias.
     pub clamp_indirect: Option<f32>,
     /// Rays of a sample that ask for emission alone, in pixels where the camera may see a lamp; 0 is none, `None` as many as
-    /// cost little ([`super::emission_pixels`]).
+    /// cost little (`emission_pixels.rs`).
     pub emission_rays: Option<u32>,
     /// How [`LightSampling::Mis`] weighs its two samples.
     pub mis_heuristic: MisHeuristic,
