@@ -65,7 +65,8 @@ int searches_per_shading() {
     // A scene without walls loses many paths to the outside: few lanes meet a surface at a time. Where nothing is compiled in,
     // as on GPUs, nobody has looked for walls.
     if (BAKED != 0u && !BAKES_LARGE_FACES) return 4;
-    return SAMPLER == SAMPLER_INDEPENDENT ? 1 : 2;
+    if (SAMPLER == SAMPLER_INDEPENDENT) return 1;
+    return 2;
 }
 
 // Longest path; reported when it is met. Roulette ends paths long before.
