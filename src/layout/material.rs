@@ -30,6 +30,11 @@ pub const MATERIAL_ALPHA_MASK: u32 = 1 << 12;
 /// `kind_flags`: alpha is the probability that the surface is there.
 pub const MATERIAL_ALPHA_BLEND: u32 = 1 << 13;
 
+/// Whether a material with these `kind_flags` emits from its back too.
+pub fn emits_from_both_sides(kind_flags: u32) -> bool {
+    kind_flags & (MATERIAL_DOUBLE_SIDED | MATERIAL_BLACK_BACK) == MATERIAL_DOUBLE_SIDED
+}
+
 /// A material's parameters; see `scene::Material`. Textures are indices of [`TextureHeader`](super::TextureHeader)s or
 /// [`NONE`](super::NONE). A shader reads the texels of what its scene needs alone.
 #[repr(C)]

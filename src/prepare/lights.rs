@@ -14,7 +14,7 @@ use super::materials::MaterialTable;
 use super::{COORDINATE_LIMIT, LightChoice, PrepareError, PrepareOptions, cdf, luminance};
 use crate::layout::{
     InstanceRecord, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE, Light,
-    MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, NONE,
+    MATERIAL_DOUBLE_SIDED, NONE, emits_from_both_sides,
 };
 use crate::scene::{PunctualKind, PunctualLight, Scene};
 
@@ -207,7 +207,7 @@ impl LightTable {
         let points = corners.map(|(point, _)| point);
         let normal = (points[1] - points[0]).cross(points[2] - points[0]);
         let flags = materials.records[triangle.material as usize].kind_flags;
-        let two_sided = flags & (MATERIAL_DOUBLE_SIDED | MATERIAL_BLACK_BACK) == MATERIAL_DOUBLE_SIDED;
+        let two_sided = emits_from_both_sides(flags);
         // An area that underflows must not make a light unpickable.
         let intensity = (0.5 * normal.length() * triangle.mean_luminance).max(f64::MIN_POSITIVE);
         // A Lambertian emitter sends π·area·L to each side it emits from.

@@ -12,8 +12,8 @@ use glam::{DVec2, DVec3, Vec3};
 use super::settings::{Integrator, Settings};
 use crate::gpu::{Buffer, Gpu, GpuResult};
 use crate::layout::{
-    LIGHT_TEXELS, LIGHT_TRIANGLE, Light, MATERIAL_BLACK_BACK, MATERIAL_DOUBLE_SIDED, MATERIAL_TEXELS, Material, NONE,
-    PROJECTION_ORTHOGRAPHIC, RenderConstants, SceneArray, Texel,
+    LIGHT_TEXELS, LIGHT_TRIANGLE, Light, MATERIAL_TEXELS, Material, NONE, PROJECTION_ORTHOGRAPHIC, RenderConstants,
+    SceneArray, Texel, emits_from_both_sides,
 };
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
@@ -78,9 +78,8 @@ fn lamps<'a>(prepared: &'a Prepared, constants: &'a RenderConstants) -> impl Ite
     // Triangles are the first of all lights.
     lights.take_while(|light| light.kind == LIGHT_TRIANGLE).filter_map(move |light| {
         let material: Material = record(tables, constants.materials + MATERIAL_TEXELS * light.material);
-        let two_sided = material.kind_flags & (MATERIAL_DOUBLE_SIDED | MATERIAL_BLACK_BACK) == MATERIAL_DOUBLE_SIDED;
         let (vertices, mirrored) = place(prepared, &light);
-        (two_sided || eye.is_before(vertices, mirrored)).then(|| eye.project(vertices))
+        (emits_from_both_sides(material.kind_flags) || eye.is_before(vertices, mirrored)).then(|| eye.project(vertices))
     })
 }
 
@@ -95,11 +94,10 @@ fn place(prepared: &Prepared, light: &Light) -> ([DVec3; 3], bool) {
     if light.instance == NONE {
         return (vertices, false);
     }
-    let rows = prepared.instances[light.instance as usize].record.object_to_world;
-    let rows = rows.map(|[x, y, z, t]| (Vec3::new(x, y, z).as_dvec3(), f64::from(t)));
-    let mirrored = rows[0].0.dot(rows[1].0.cross(rows[2].0)) < 0.0;
+    let instance = &prepared.instances[light.instance as usize].record;
+    let rows = instance.object_to_world.map(|[x, y, z, t]| (Vec3::new(x, y, z).as_dvec3(), f64::from(t)));
     let placed = vertices.map(|v| DVec3::from(rows.map(|(row, translation)| row.dot(v) + translation)));
-    (placed, mirrored)
+    (placed, instance.mirrored != 0)
 }
 
 /// The camera, turned around: from a point to its place on the film.
