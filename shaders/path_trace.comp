@@ -29,6 +29,7 @@ layout(set = 0, binding = 2, std430) buffer LaneBlock { LaneState lanes[]; };
 layout(set = 0, binding = 5, std430) buffer AovBlock { AovSums block_aovs[]; };
 layout(set = 0, binding = 6, std430) buffer CounterBlock { RayCounters block_counters[]; };
 layout(set = 0, binding = 7, std430) buffer QueueBlock { SliceQueue queue; };
+layout(set = 0, binding = 9, std430) readonly buffer AtomBlock { Atom atoms[]; };
 layout(push_constant) uniform SliceBlock { SliceConstants slice; };
 #include "include/queue.glsl"
 

@@ -57,6 +57,7 @@ def equality_lines(result) -> list[str]:
 def write_report(results, path) -> None:
     text = [f"Processor: {results['processor']}; load average at the start {results['load_average']:.1f}; "
             f"{results['resolution']}×{results['resolution']}; Mitsuba's sampler: {results['mitsuba_sampler']}; "
+            f"Sunfleck's flags: {results['sunfleck_flags'] or 'none'}; "
             f"the whole run took {results['seconds'] / 60:.0f} minutes.", ""]
     text += [f"**Absent**: {name}: {why}\n" for name, why in results["absent"].items()]
     text += [f"**Failed**: {scene}: {why}\n" for scene, why in results["failed"].items()]

@@ -35,6 +35,7 @@ def arguments():
     parser.add_argument("--resolution", type=int, default=256)
     parser.add_argument("--timeout", type=float, default=240.0, help="seconds until a silent renderer is given up [240]")
     parser.add_argument("--mitsuba-sampler", default="multijitter")
+    parser.add_argument("--sunfleck-flags", default="", help="more flags for `sunfleck render`, as in '--adaptive'")
     parser.add_argument("--out", type=Path, default=HERE.parents[1] / "out" / "peers")
     parser.add_argument("--short", action="store_true", help="the check of CI: Mitsuba alone, cornell, 64x64")
     chosen = parser.parse_args()
@@ -122,7 +123,7 @@ def compare_scene(name, renderers, chosen) -> dict:
     children = {}
     try:
         for renderer in (r for r in renderers if not missing[r]):
-            options = {"sampler": chosen.mitsuba_sampler}
+            options = {"sampler": chosen.mitsuba_sampler, "flags": chosen.sunfleck_flags.split()}
             children[renderer] = Child(renderer, name, chosen.out, chosen.resolution, options, chosen.timeout)
         images = measured(children, chosen)
         truth = references(children, images, chosen)
@@ -180,7 +181,8 @@ def main() -> int:
         return 4
     chosen.out.mkdir(parents=True, exist_ok=True)
     results = {"processor": processor(), "load_average": os.getloadavg()[0], "absent": absent, "scenes": [],
-               "mitsuba_sampler": chosen.mitsuba_sampler, "resolution": chosen.resolution, "failed": {}}
+               "mitsuba_sampler": chosen.mitsuba_sampler, "sunfleck_flags": chosen.sunfleck_flags,
+               "resolution": chosen.resolution, "failed": {}}
     started, good = time.monotonic(), True
     for name in scenes:
         try:

@@ -45,14 +45,6 @@ struct LaneState {
     uint emission_ray;     // the number of the emission ray that the lane traces; 0: the path
 };
 
-// Pixels are numbered by 8×8 tiles in rows, and row by row inside a tile.
-uvec2 pixel_of_index(RenderConstants constants, uint index) {
-    uint tiles_across = (constants.width + 7u) / 8u;
-    uint tile = index / 64u;
-    uint inside = index % 64u;
-    return divide_whole(tile, tiles_across).yx * 8u + uvec2(inside % 8u, inside / 8u);
-}
-
 void begin_block(inout LaneState lane) {
     lane.rays = 0u;
     lane.non_finite = 0u;
@@ -94,20 +86,13 @@ LaneState idle_lane() {
     return lane;
 }
 
-// Gives the lane an atom of the slice; it has no samples if its pixel is outside of the image.
-void begin_atom(inout LaneState lane, RenderConstants constants, SliceConstants slice, uint index) {
-    uint pixels = ((constants.width + 7u) / 8u) * ((constants.height + 7u) / 8u) * 64u;
-    uint atom = slice.first_atom + index;
-    uvec2 block_and_pixel = divide_whole(atom, pixels);
-    uvec2 pixel = pixel_of_index(constants, block_and_pixel.y);
-    uint first = (slice.first_block + block_and_pixel.x) * BLOCK_SAMPLES;
-    bool outside = pixel.x >= constants.width || pixel.y >= constants.height;
-    lane.atom = index;
-    lane.ray_limit = slice.ray_budget;
-    lane.pixel = pixel.x | pixel.y << 16u;
-    lane.sample_index = max(first, constants.first_sample);
-    // The last block may end at sample index 2^32 − 1.
-    lane.end_sample = outside ? lane.sample_index : first + min(BLOCK_SAMPLES, constants.end_sample - first);
+// Gives the lane the slice's atom of that number.
+void begin_atom(inout LaneState lane, Atom atom, uint number, uint ray_budget) {
+    lane.atom = number;
+    lane.ray_limit = ray_budget;
+    lane.pixel = atom.pixel;
+    lane.sample_index = atom.first_sample;
+    lane.end_sample = atom.end_sample;
     begin_block(lane);
 }
 

@@ -88,8 +88,8 @@ struct RenderConstants {
     uint height;
     uint seed;
     uint max_bounces;
-    uint first_sample;
-    uint end_sample;
+    uint light_bvh;
+    uint light_bvh_counts;
     uint vertices;
     uint root_slot;
     uint materials;
@@ -108,25 +108,31 @@ struct RenderConstants {
     float environment_cos;
     vec3 scene_center;
     float environment_sin;
-    uint light_bvh;
-    uint light_bvh_counts;
     uint near_lights;
     float clamp_indirect;
     float zero;
     uint environment_rgbe;
     uint rest_root_slot;
     uint emission_rays;
+    uint unused_0;
+    uint unused_1;
 };
 
 struct SliceConstants {
-    uint first_atom;
     uint lanes;
-    uint first_block;
+    uint atoms;
+    uint most_samples;
     uint ray_budget;
     uint resume;
-    uint atoms;
     uint prints;
-    uint unused;
+    uint unused_0;
+    uint unused_1;
+};
+
+struct Atom {
+    uint pixel;
+    uint first_sample;
+    uint end_sample;
 };
 
 struct SliceQueue {

@@ -36,18 +36,6 @@ uvec2 small_whole(vec2 x) { return floatBitsToUint(x + 8388608.0) & 0x7fffffu; }
 // The texel at the corner of a lookup's square: whole numbers from −1 on.
 ivec2 texel_of_corner(vec2 corner) { return ivec2(small_whole(corner + 1.0)) - 1; }
 
-// Quotient and remainder, for quotients of at most 2^28 and b of at most 2^31; lavapipe divides integers lane by lane. The upper
-// digits of the quotient first, then the 10 below: with the factor, which outweighs all roundings (a quotient of floats may err
-// by 2.5 ulp), neither is too large, and the sum is at most one too small.
-uvec2 divide_whole(uint a, uint b) {
-    float inverse = 0.99999904632568359375 / float(b);
-    uint quotient = small_whole(floor(float(a) * inverse * 0.0009765625)) << 10u;
-    quotient += small_whole(floor(float(a - quotient * b) * inverse));
-    uint remainder = a - quotient * b;
-    bool too_small = remainder >= b;
-    return uvec2(quotient + uint(too_small), too_small ? remainder - b : remainder);
-}
-
 // (cos 2πu, sin 2πu) for u in [0, 1]. The argument is reduced to [−π/4, π/4], where the polynomials (the single-precision
 // ones of the Cephes library, sinf.c) are good to 1 ulp.
 vec2 cos_sin_turns(float u) {

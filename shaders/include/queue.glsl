@@ -51,7 +51,7 @@ void store_kept_result() {
 // In every turn of the loop.
 void store_kept_result_in_turn() {
     turns_kept += 1u;
-    if (turns_kept < TURNS_PER_SAMPLE * min(BLOCK_SAMPLES, constants.end_sample - constants.first_sample)) return;
+    if (turns_kept < TURNS_PER_SAMPLE * slice.most_samples) return;
     turns_kept = 0u;
     store_kept_result();
 }
@@ -68,22 +68,16 @@ void finish_atom(LaneState lane) {
     finished_atoms += 1u;
 }
 
-// Takes the slice's next atom that has samples; false if none is left.
+// Takes the slice's next atom; false if none is left.
 bool take_atom(inout LaneState lane) {
-    while (rounds < ROUNDS_FOR_ATOMS) {
-        rounds += 1u;
-        uint atom = atomicAdd(queue.taken, 1u);
-        if (atom >= slice.atoms) break;
-        begin_atom(lane, constants, slice, atom);
-        if (HAS_EXTRAS) begin_extras();
-        if (lane.sample_index < lane.end_sample) {
-            if (HAS_EMISSION_RAYS) begin_emission_rays(lane, constants);
-            return true;
-        }
-        finish_atom(lane);
-    }
     lane.atom = NONE;
-    return false;
+    if (rounds >= ROUNDS_FOR_ATOMS) return false;
+    uint number = atomicAdd(queue.taken, 1u);
+    if (number >= slice.atoms) return false;
+    begin_atom(lane, atoms[number], number, slice.ray_budget);
+    if (HAS_EXTRAS) begin_extras();
+    if (HAS_EMISSION_RAYS) begin_emission_rays(lane, constants);
+    return true;
 }
 
 // An atom each would keep the cores waiting for one another.

@@ -119,7 +119,7 @@ impl Images {
         // All rows of one seed after the other, so that a drift of the machine's speed falls on every row.
         'images: for seed in (0..plan.seeds).map(|n| settings.seed.wrapping_add(n)) {
             for (row, &budget) in plan.rows.iter().enumerate() {
-                let run = match work.render(tracer, seed, budget) {
+                let run = match work.render(tracer, seed, settings.adaptive, budget) {
                     Err(Error::Interrupted) => {
                         interrupted = true;
                         break 'images;

@@ -50,7 +50,7 @@ pub(super) fn render(
     let mut image = ImageAccumulator::new((settings.width, settings.height));
     let (mut seconds, mut spp) = (0.0, 0.0);
     for seed in (0..REFERENCE_PARTS).map(|n| first_seed.wrapping_add(n)) {
-        let run = work.render(&mut tracer, seed, budget.part(REFERENCE_PARTS))?;
+        let run = work.render(&mut tracer, seed, None, budget.part(REFERENCE_PARTS))?;
         let part_spp = run.film.mean_samples_per_pixel();
         image.add(&run.film.radiance(), part_spp);
         seconds += run.seconds;

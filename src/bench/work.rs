@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::plan::Budget;
-use crate::render::{PathTracer, ProgressUpdate, Run, StopReason};
+use crate::render::{PathTracer, ProgressUpdate, Run, RunPlan, StopReason};
 use crate::{Error, Result};
 
 /// Called after every slice; says whether to go on.
@@ -45,17 +45,24 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Renders one image.
+    /// Renders one image, after a `pilot` if adaptively.
     ///
     /// # Errors
     /// Those of a render; [`Error::Interrupted`] if the caller says so; [`Error::Usage`] if the time was too short for a
     /// sample in every pixel.
-    pub(super) fn render(&mut self, tracer: &mut PathTracer, seed: u32, budget: Budget) -> Result<Run> {
+    pub(super) fn render(
+        &mut self,
+        tracer: &mut PathTracer,
+        seed: u32,
+        pilot: Option<u32>,
+        budget: Budget,
+    ) -> Result<Run> {
         let (spp, time) = match budget {
             Budget::Samples(spp) => (spp, None),
             Budget::Time(time) => (u32::MAX, Some(time)),
         };
-        let run = tracer.run(seed, 0..spp, time, &mut |update| {
+        let plan = RunPlan { samples: 0..spp, time, pilot, ..RunPlan::default() };
+        let run = tracer.run_plan(seed, &plan, &mut |update| {
             (self.progress)(&ProgressUpdate {
                 samples_done: self.samples_done + update.samples_done,
                 samples_total: self.samples_total,

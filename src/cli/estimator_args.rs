@@ -45,6 +45,11 @@ pub(crate) struct EstimatorArgs {
     /// lamps for little time; 0 is none [default: a power of two up to 8, by how few these pixels are].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=256), help_heading = "Light transport")]
     emission_rays: Option<u32>,
+    /// Adaptive sampling: a pilot of N samples per pixel, which are no part of the image, finds where it is noisy; there each
+    /// sample becomes up to 32, and at most 1.25 in an average pixel. --spp, --samples and --target-error count those of the
+    /// other pixels. Unbiased, and the same for every part of a run [N: 8].
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "8", value_parser = clap::value_parser!(u32).range(4..=4096), help_heading = "Light transport")]
+    adaptive: Option<u32>,
     /// Look up every texture in the file's own texels; without it, those of colours and roughness in mip chains, by ray
     /// cones that are a quarter of a pixel wide and widen at each scattering event.
     #[arg(long, help_heading = "Light transport")]
@@ -109,6 +114,9 @@ impl EstimatorArgs {
         if let Some(rays) = self.emission_rays {
             add("emission-rays", rays.to_string());
         }
+        if let Some(samples) = self.adaptive {
+            add("adaptive", samples.to_string());
+        }
         if let Some(sampling) = self.env_sampling {
             add("env-sampling", sampling.to_string());
         }
@@ -170,6 +178,7 @@ impl EstimatorArgs {
         settings.bake = !self.no_bake;
         settings.clamp_indirect = self.clamp_indirect;
         settings.emission_rays = self.emission_rays;
+        settings.adaptive = self.adaptive;
         settings.trace = self.trace;
         settings.bvh_quality = self.bvh_quality;
         settings.device = self.device;

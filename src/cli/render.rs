@@ -174,7 +174,7 @@ fn write_tone_mapped(path: &Path, job: &RenderJob, film: &Film) -> sunfleck::Res
 fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {
     Metadata {
         seed: Some(job.settings.seed),
-        sample_ranges: vec![job.settings.samples_in(&result.film)],
+        sample_ranges: vec![result.samples.clone()],
         render_time_seconds: Some(result.seconds.render as f32),
         world_to_camera: Some(result.world_to_camera),
         world_to_ndc: Some(result.world_to_ndc),
@@ -183,13 +183,19 @@ fn metadata(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Metadata {
         kernel_key: Some(result.kernel_key.clone()),
         scene: Some(scene.name.clone()),
         integrator: Some(job.settings.integrator.to_string()),
-        sampler: Some(job.settings.sampler.to_string()),
+        sampler: Some(sampler_text(&job.settings)),
         clamp_indirect: job.settings.clamp_indirect,
         estimated_error: result.error_estimate.map(|e| e.error as f32),
         estimated_error_interval: result.error_estimate.map(|e| e.interval.map(|bound| bound as f32)),
         device: Some(format!("{}, {}", result.device, result.driver)),
         ..Metadata::default()
     }
+}
+
+/// How the samples were drawn.
+fn sampler_text(settings: &Settings) -> String {
+    let adaptive = settings.adaptive.map(|pilot| format!(", adaptive by a pilot of {pilot}"));
+    format!("{}{}", settings.sampler, adaptive.unwrap_or_default())
 }
 
 /// Whether a run whose images are written was a success.
@@ -239,6 +245,8 @@ mod tests {
         film.add_block(1, [2.0; 3], 1.5, 4);
         RenderResult {
             film,
+            samples: 0..4,
+            pilot: None,
             aovs: None,
             statistics: None,
             stopped_by: StopReason::Samples,

@@ -12,7 +12,6 @@ use super::render_args::RenderJob;
 pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> Value {
     let rate = |count: u64| count as f64 / result.seconds.render.max(1e-9);
     let warnings = [scene.warnings.as_slice(), result.warnings.as_slice()].concat();
-    let samples = job.settings.samples_in(&result.film);
     let pictures = job.aov_pictures.iter().map(|(path, _)| path);
     let outputs: Vec<_> =
         job.outputs.iter().map(|(path, _)| path).chain(pictures).map(|path| path.display().to_string()).collect();
@@ -30,7 +29,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "width": result.film.width(),
         "height": result.film.height(),
         "spp": result.film.mean_samples_per_pixel(),
-        "samples": [samples.start, samples.end],
+        "samples": [result.samples.start, result.samples.end],
         "seed": job.settings.seed,
         "integrator": job.settings.integrator.name(),
         "sampler": job.settings.sampler.name(),
@@ -61,6 +60,7 @@ pub(crate) fn report(job: &RenderJob, scene: &Scene, result: &RenderResult) -> V
         "outputs": outputs,
     });
     object["aovs"] = json!(aovs);
+    object["adaptive"] = json!(result.pilot);
     object["statistics"] = json!(result.statistics.as_ref().map(Statistics::report));
     object
 }
@@ -97,6 +97,17 @@ fn print_error(job: &RenderJob, result: &RenderResult) {
     }
 }
 
+fn print_pilot(result: &RenderResult) {
+    let Some(pilot) = result.pilot else { return };
+    let share = 100.0 * pilot.found.noisy_pixels as f64 / result.film.pixels().len().max(1) as f64;
+    eprintln!(
+        "  pilot of {} samples per pixel in {}: {share:.1} % of the pixels have up to {} times the samples",
+        pilot.samples,
+        time(pilot.seconds),
+        pilot.found.most_samples
+    );
+}
+
 /// What the run did, in a few lines on standard error.
 pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
     let film = &result.film;
@@ -116,6 +127,7 @@ pub(crate) fn print_summary(job: &RenderJob, result: &RenderResult) {
     let seconds = result.seconds.render.max(1e-9);
     let rate = |count: u64| with_prefix(count as f64 / seconds);
     eprintln!("  {}paths/s, {}rays/s", rate(result.paths), rate(result.rays));
+    print_pilot(result);
     print_error(job, result);
     if result.non_finite_samples > 0 {
         eprintln!("warning: {} samples were NaN or infinite; each is a bug:", result.non_finite_samples);

@@ -35,10 +35,10 @@ pub struct RenderConstants {
     pub seed: u32,
     /// Largest number of scattering events.
     pub max_bounces: u32,
-    /// First sample index of the range rendered.
-    pub first_sample: u32,
-    /// One past its last sample index.
-    pub end_sample: u32,
+    /// First texel of the light BVH in [`SceneArray::Tables`](super::SceneArray::Tables), if lights are chosen by one.
+    pub light_bvh: u32,
+    /// Its share of the [`CDF_TOTAL`](super::CDF_TOTAL) counts, 0 without one.
+    pub light_bvh_counts: u32,
     /// First texel of the vertices in [`SceneArray::Attributes`](super::SceneArray::Attributes).
     pub vertices: u32,
     /// Slot at which traversal starts.
@@ -75,11 +75,7 @@ pub struct RenderConstants {
     pub scene_center: [f32; 3],
     /// Sine of the environment's rotation about +Y.
     pub environment_sin: f32,
-    /// First texel of the light BVH in [`SceneArray::Tables`](super::SceneArray::Tables), if lights are chosen by one.
-    pub light_bvh: u32,
-    /// Its share of the [`CDF_TOTAL`](super::CDF_TOTAL) counts, 0 without one.
-    pub light_bvh_counts: u32,
-    /// Lights in it: those with a place, which come first.
+    /// Lights in the light BVH: those with a place, which come first.
     pub near_lights: u32,
     /// Most that a path may bring at once after two scattering events or more, largest component; 0 without a bound.
     pub clamp_indirect: f32,
@@ -91,4 +87,8 @@ pub struct RenderConstants {
     pub rest_root_slot: u32,
     /// Emission rays of a sample, in the pixels that are picked for them (src/render/emission_pixels.rs).
     pub emission_rays: u32,
+    /// Unused, zero.
+    pub unused_0: u32,
+    /// Unused, zero.
+    pub unused_1: u32,
 }

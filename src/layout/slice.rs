@@ -2,27 +2,50 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// What a slice renders: the atoms `0..atoms`, atom i being block `first_block` + a / pixels of pixel a mod pixels with
-/// a = `first_atom` + i. Lanes `0..lanes` take them from a [`SliceQueue`].
+/// What a slice renders: a list of `atoms` [`Atom`]s. Lanes `0..lanes` take them from a [`SliceQueue`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct SliceConstants {
-    /// First atom, counted within `first_block`.
-    pub first_atom: u32,
     /// Number of lanes.
     pub lanes: u32,
-    /// Aligned block of 16 sample indices that `first_atom` belongs to.
-    pub first_block: u32,
+    /// Number of atoms.
+    pub atoms: u32,
+    /// Most samples that one of them has.
+    pub most_samples: u32,
     /// A lane saves its state after this many rays of an atom and goes on in the next dispatch.
     pub ray_budget: u32,
     /// 1 if the lanes go on from their saved state.
     pub resume: u32,
-    /// Number of atoms.
-    pub atoms: u32,
     /// 1 if the only lane writes what it prints behind its result (shaders/include/debug.glsl).
     pub prints: u32,
     /// Unused, zero.
-    pub unused: u32,
+    pub unused_0: u32,
+    /// Unused, zero.
+    pub unused_1: u32,
+}
+
+/// What a lane renders at a time: sample indices of one pixel, all in one block of [`BLOCK_SAMPLES`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Atom {
+    /// Column | row << 16.
+    pub pixel: u32,
+    /// First sample index.
+    pub first_sample: u32,
+    /// One past the last.
+    pub end_sample: u32,
+}
+
+impl Atom {
+    /// Column and row of its pixel.
+    pub fn place(&self) -> (u32, u32) {
+        (self.pixel & 0xffff, self.pixel >> 16)
+    }
+
+    /// The block of its samples.
+    pub fn block(&self) -> u32 {
+        self.first_sample / BLOCK_SAMPLES
+    }
 }
 
 /// The atoms of a slice, of which a lane takes the next when it has finished one.

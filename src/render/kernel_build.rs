@@ -161,6 +161,7 @@ pub(super) fn with_sets<T>(
             set.push((6, BindingResource::Storage(slice.counters.as_ref().unwrap_or(&slice.results))));
             set.push((7, BindingResource::Storage(&slice.queue)));
             set.push((8, BindingResource::Storage(view.emission_pixels.as_ref().unwrap_or(&slice.results))));
+            set.push((9, BindingResource::Storage(&slice.atoms)));
             set
         })
         .collect();

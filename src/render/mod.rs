@@ -1,5 +1,6 @@
 //! Rendering: what is asked for ([`Settings`]), how it goes on ([`ProgressUpdate`]) and what comes out ([`RenderResult`]).
 
+mod adaptive;
 mod bake;
 mod calibrate;
 mod emission_pixels;
@@ -23,6 +24,7 @@ mod statistics;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+pub use adaptive::FactorReport;
 pub use bake::{Bake, BakeReport, Baked, MOST_BAKED_RECORDS, MOST_BAKED_TRIANGLES};
 pub use calibrate::calibrate;
 pub use function_kernel::{FunctionCall, FunctionKernel};
@@ -34,7 +36,7 @@ pub use path_tracer::PathTracer;
 pub use prints::Printed;
 pub use progress::ProgressUpdate;
 pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
-pub use run::{Run, RunPlan};
+pub use run::{Pilot, Run, RunPlan};
 pub use scene_buffers::{SceneBuffers, choose_array_form};
 pub use settings::{
     DeviceChoice, Integrator, LightSampling, MisHeuristic, PixelFilter, SamplerKind, Settings, TraceChoice,
@@ -163,6 +165,8 @@ pub fn render_on(
         non_finite_samples: run.non_finite_samples,
         first_non_finite: run.first_non_finite,
         film: run.film,
+        samples: run.samples,
+        pilot: run.pilot,
         aovs: run.aovs,
         statistics: run.statistics,
         world_to_camera: world_to_camera(camera.camera_to_world),

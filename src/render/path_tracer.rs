@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
+use super::adaptive::{PilotFilm, SampleFactors};
 use super::bake::BakeReport;
 use super::emission_pixels::EmissionPixels;
 use super::kernel_build::{
@@ -18,13 +19,16 @@ use super::run::{Limits, SliceResults};
 use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
-use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
+use super::{Pilot, ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
 use crate::gpu::{Gpu, Kernel, TraceBackend};
-use crate::layout::RenderConstants;
+use crate::layout::{RenderConstants, SliceConstants};
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
+
+/// By what bits the seeds of the two pilots differ from the image's: by no small number, as seeds of users do.
+const PILOT_SEEDS: [u32; 2] = [0x9e37_79b9, 0x6a09_e667];
 
 /// A scene on a device, ready to be rendered.
 pub struct PathTracer {
@@ -118,7 +122,7 @@ impl PathTracer {
         let kernel = build_kernel(gpu, &key, &spirv, overrides, &buffers, &view, &slices)?;
         slices[0].warm_up(&kernel)?;
         let compile_seconds = start.elapsed().as_secs_f64();
-        let sizes = SliceSizes::new(overrides, slices[0].atoms());
+        let sizes = SliceSizes::new(overrides, slices[0].most_atoms());
         Ok(Self {
             key,
             kernel,
@@ -160,7 +164,7 @@ impl PathTracer {
         let (spirv, bake) = baked_spirv(gpu, prepared, settings, self.overrides, &mut key)?;
         // Other sums lie in other buffers.
         let mut others = ((key.aovs, key.statistics) != (self.key.aovs, self.key.statistics))
-            .then(|| new_slices(gpu, self.slices[0].atoms(), &key))
+            .then(|| new_slices(gpu, self.slices[0].most_atoms(), &key))
             .transpose()?;
         let slices = others.as_ref().unwrap_or(&self.slices);
         let view = ViewBuffers::new(gpu, &emission)?;
@@ -180,7 +184,7 @@ impl PathTracer {
 
     /// What slices of another kernel or scene have taken says nothing.
     pub(super) fn forget_sizes(&mut self) {
-        self.sizes = SliceSizes::new(self.overrides, self.slices[0].atoms());
+        self.sizes = SliceSizes::new(self.overrides, self.slices[0].most_atoms());
     }
 
     /// The key of the kernel that [`PathTracer::rebuild`] would build, but for what it would compile in, and emission rays.
@@ -211,7 +215,8 @@ impl PathTracer {
         time: Option<Duration>,
         progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
     ) -> Result<Run> {
-        self.run_plan(seed, &RunPlan { samples, time, target_error: None, estimate: false }, progress)
+        let plan = RunPlan { samples, time, ..RunPlan::default() };
+        self.run_plan(seed, &plan, progress)
     }
 
     /// Renders what the plan says. The image of a run that ends at an error is, bit for bit, that of the same range.
@@ -228,17 +233,25 @@ impl PathTracer {
         if plan.estimates_error() && self.key.sampler != SamplerKind::Independent && !self.key.replicates {
             return Err(Error::Usage(String::from("the path tracer was not built to estimate its error")));
         }
-        self.constants.seed = seed;
+        let start = Instant::now();
         let looks = Looks::new(plan.samples.clone(), plan.target_error);
         let mut run = Run::new(&self.constants, plan, &self.key);
         // An open end is no total.
         let mut expected = (plan.samples.end < u32::MAX).then(|| plan.samples.end - plan.samples.start);
-        let (start, mut done, mut end) = (Instant::now(), plan.samples.start, looks.first_end());
+        let mut limits = Limits { start, time: plan.time, samples_total: None };
+        let mut factors = SampleFactors::default();
+        let pixels = run.film.pixels().len();
+        if let Some(samples) = plan.pilot {
+            limits.samples_total = expected.map(|n| u64::from(n + samples) * pixels as u64);
+            factors = self.pilot(&mut run, seed, samples, &limits, progress)?;
+        }
+        let before = run.paths;
+        let per_sample = factors.samples(pixels);
+        self.constants.seed = seed;
+        let (mut done, mut end) = (plan.samples.start, looks.first_end());
         loop {
-            self.constants.first_sample = done;
-            self.constants.end_sample = end;
-            let limits = Limits { start, time: plan.time, samples_total: expected.map(|n| self.total_samples(n)) };
-            self.run_range(&mut run, &limits, progress)?;
+            limits.samples_total = expected.map(|n| before + u64::from(n) * per_sample);
+            self.run_range(&mut run, done..end, &factors, &limits, progress)?;
             if run.stopped_by != StopReason::Samples || plan.target_error.is_none() {
                 break;
             }
@@ -256,16 +269,52 @@ impl PathTracer {
         Ok(run)
     }
 
-    /// Renders the range of samples that stands in the constants, and adds it to the run.
+    /// Finds how many samples of its own each pixel is to have for one of the image, by so many samples that are no part of
+    /// it: they have seeds of their own.
+    fn pilot(
+        &mut self,
+        run: &mut Run,
+        seed: u32,
+        samples: u32,
+        limits: &Limits,
+        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+    ) -> Result<SampleFactors> {
+        let halves = [samples / 2, samples - samples / 2].into_iter().zip(PILOT_SEEDS);
+        let mut pilots = Vec::with_capacity(2);
+        for (samples, differs) in halves {
+            self.constants.seed = seed ^ differs;
+            let mut pilot = Run::new(&self.constants, &RunPlan::default(), &self.key);
+            pilot.pixel_rays = vec![0; pilot.film.pixels().len()];
+            let before = run.paths;
+            self.run_range(&mut pilot, 0..samples, &SampleFactors::default(), limits, &mut |update| {
+                progress(&ProgressUpdate { samples_done: before + update.samples_done, run: None, ..*update })
+            })?;
+            run.add_pilot(&pilot);
+            pilots.push(PilotFilm { film: pilot.film, rays: pilot.pixel_rays });
+        }
+        let factors = <[PilotFilm; 2]>::try_from(pilots)
+            .map_or_else(|_| SampleFactors::default(), |pilots| SampleFactors::from_pilots(&pilots));
+        run.pilot = Some(Pilot {
+            samples,
+            paths: run.paths,
+            seconds: limits.start.elapsed().as_secs_f64(),
+            found: factors.report(),
+        });
+        Ok(factors)
+    }
+
+    /// Renders a range of the image's samples, and adds it to the run.
     fn run_range(
         &mut self,
         run: &mut Run,
+        samples: Range<u32>,
+        factors: &SampleFactors,
         limits: &Limits,
         progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
     ) -> Result<()> {
         self.view.constants.write(&[self.constants])?;
-        self.sizes.begin(self.constants.end_sample - self.constants.first_sample);
-        let mut schedule = Schedule::new(&self.constants);
+        self.sizes.begin(samples.end - samples.start);
+        let mut schedule = Schedule::new(&self.constants, samples);
         let mut in_flight = VecDeque::new();
         let mut free: Vec<usize> = (0..self.slices.len()).collect();
         let mut last_end = Instant::now();
@@ -275,23 +324,25 @@ impl PathTracer {
             }
             while run.stopped_by == StopReason::Samples && !schedule.is_done() {
                 let Some(slot) = free.pop() else { break };
-                let constants =
-                    schedule.next(self.sizes.next_atoms(), self.slices[slot].lanes(), self.sizes.ray_budget());
-                self.slices[slot].submit(&self.kernel, slot, constants)?;
-                in_flight.push_back(slot);
+                let atoms = schedule.next(self.sizes.next_atoms(), factors);
+                let constants = SliceConstants { ray_budget: self.sizes.ray_budget(), ..SliceConstants::default() };
+                self.slices[slot].submit(&self.kernel, slot, &atoms, constants)?;
+                in_flight.push_back((slot, atoms, schedule.reached()));
             }
             // In the order of submission, so that a pixel's blocks are joined by their index.
-            let Some(slot) = in_flight.pop_front() else { return Ok(()) };
+            let Some((slot, atoms, reached)) = in_flight.pop_front() else { return Ok(()) };
             let outcome = self.slices[slot].finish(&self.kernel, slot, last_end)?;
             last_end = Instant::now();
             self.sizes.observe(&outcome);
-            let (slice, atoms) = (&self.slices[slot], outcome.constants.atoms);
+            let (slice, count) = (&self.slices[slot], outcome.constants.atoms);
             let brought = SliceResults {
-                results: slice.results(atoms)?,
-                aovs: slice.aovs(atoms)?,
-                counters: slice.counters(atoms)?,
+                atoms: &atoms,
+                results: slice.results(count)?,
+                aovs: slice.aovs(count)?,
+                counters: slice.counters(count)?,
             };
-            run.add(&self.constants, &outcome, &brought, self.origin);
+            run.add(&outcome, &brought, self.origin);
+            run.samples.end = reached;
             free.push(slot);
             let update = ProgressUpdate {
                 samples_done: run.paths,
@@ -304,10 +355,6 @@ impl PathTracer {
                 run.stop(StopReason::Interrupted);
             }
         }
-    }
-
-    fn total_samples(&self, per_pixel: u32) -> u64 {
-        u64::from(per_pixel) * u64::from(self.constants.width) * u64::from(self.constants.height)
     }
 }
 

@@ -3,9 +3,8 @@
 use std::time::Instant;
 
 use super::path_tracer::PathTracer;
-use super::schedule::index_of_pixel;
 use crate::Result;
-use crate::layout::{BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, SliceConstants};
+use crate::layout::{Atom, BlockResult, DEBUG_RECORDS, SliceConstants};
 
 /// A value that a sample printed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,19 +22,16 @@ impl PathTracer {
     /// # Errors
     /// When the device is lost.
     pub fn prints(&mut self, seed: u32, (x, y): (u32, u32), sample: u32) -> Result<Vec<Printed>> {
-        (self.constants.seed, self.constants.first_sample, self.constants.end_sample) = (seed, sample, sample + 1);
+        self.constants.seed = seed;
         self.view.constants.write(&[self.constants])?;
         let push = SliceConstants {
-            first_atom: index_of_pixel(&self.constants, x, y),
-            lanes: 1,
-            atoms: 1,
-            first_block: sample / BLOCK_SAMPLES,
             // In one dispatch: what is printed is counted in it.
             ray_budget: u32::MAX,
             prints: 1,
             ..SliceConstants::default()
         };
-        self.slices[0].submit(&self.kernel, 0, push)?;
+        let atom = Atom { pixel: x | y << 16, first_sample: sample, end_sample: sample + 1 };
+        self.slices[0].submit(&self.kernel, 0, &[atom], push)?;
         self.slices[0].finish(&self.kernel, 0, Instant::now())?;
         let records = self.slices[0].results(2 + DEBUG_RECORDS)?;
         Ok(decode(&records[1..]))

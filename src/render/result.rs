@@ -1,8 +1,9 @@
 //! What a render returns: the film, and what the run has to say about itself.
 
 use std::fmt;
+use std::ops::Range;
 
-use super::{BakeReport, Statistics};
+use super::{BakeReport, Pilot, Statistics};
 use crate::film::Film;
 use crate::film::aov::AovFilm;
 use crate::film::replicates::{ErrorEstimate, RobustMean};
@@ -13,6 +14,10 @@ use crate::prepare::LightChoice;
 pub struct RenderResult {
     /// The samples.
     pub film: Film,
+    /// Which of the image they are; a run that ended early has the first ones.
+    pub samples: Range<u32>,
+    /// What the pilot of adaptive sampling found, if there was one.
+    pub pilot: Option<Pilot>,
     /// What was kept besides radiance, if the settings ask for anything.
     pub aovs: Option<AovFilm>,
     /// Counters, if the settings ask for them.
@@ -37,7 +42,7 @@ pub struct RenderResult {
     pub light_choice: LightChoice,
     /// Rays traced, shadow rays included.
     pub rays: u64,
-    /// Paths traced: samples over all pixels.
+    /// Paths traced: samples over all pixels, those of a pilot too.
     pub paths: u64,
     /// Where the time went.
     pub seconds: Seconds,

@@ -4,17 +4,18 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
+use serde::Serialize;
 
-use super::schedule::{padded_pixels, pixel_of_index};
+use super::adaptive::FactorReport;
 use super::slices::SliceOutcome;
 use super::{KernelKey, NonFiniteSample, Settings, Statistics, StopReason};
 use crate::film::Film;
 use crate::film::aov::{AovFilm, AovSample};
 use crate::film::replicates::ReplicateSums;
-use crate::layout::{AovSums, BLOCK_SAMPLES, BlockResult, RayCounters, RenderConstants};
+use crate::layout::{AovSums, Atom, BLOCK_SAMPLES, BlockResult, RayCounters, RenderConstants};
 
 /// What a run renders and what ends it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct RunPlan {
     /// Sample indices.
     pub samples: Range<u32>,
@@ -24,6 +25,8 @@ pub struct RunPlan {
     pub target_error: Option<f64>,
     /// Keep the sums of replicates, which an error estimate is made of; a target implies it.
     pub estimate: bool,
+    /// Samples of a pilot, at least 2, which finds the noisy pixels; they then have more samples of their own.
+    pub pilot: Option<u32>,
 }
 
 impl RunPlan {
@@ -39,6 +42,7 @@ impl RunPlan {
             time: settings.time,
             target_error: settings.target_error,
             estimate: settings.estimate,
+            pilot: settings.adaptive,
         }
     }
 }
@@ -55,6 +59,10 @@ pub(super) struct Limits {
 pub struct Run {
     /// The samples.
     pub film: Film,
+    /// Those of the image that it holds; a run that ended early has the first ones, of the last block not in every pixel.
+    pub samples: Range<u32>,
+    /// What the pilot found, if there was one.
+    pub pilot: Option<Pilot>,
     /// AOVs, if the kernel sums any.
     pub aovs: Option<AovFilm>,
     /// Blocks in which the count behind [`crate::film::aov::Aov::Cost`] stopped at the largest number.
@@ -65,9 +73,9 @@ pub struct Run {
     pub stopped_by: StopReason,
     /// The sums of replicates, if they were asked for.
     pub replicates: Option<ReplicateSums>,
-    /// Rays traced.
+    /// Rays traced, those of the pilot too.
     pub rays: u64,
-    /// Paths traced.
+    /// Paths traced, those of the pilot too.
     pub paths: u64,
     /// Samples that were NaN or infinite.
     pub non_finite_samples: u64,
@@ -77,6 +85,22 @@ pub struct Run {
     pub capped_samples: u64,
     /// Wall time.
     pub seconds: f64,
+    /// Rays of each pixel; empty if nobody asks.
+    pub(super) pixel_rays: Vec<u64>,
+}
+
+/// What the pilot of adaptive sampling was, and what it found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Pilot {
+    /// Its samples of every pixel; none of them is in the image.
+    pub samples: u32,
+    /// Its paths.
+    pub paths: u64,
+    /// Its wall time.
+    pub seconds: f64,
+    /// How samples are shared out after it.
+    #[serde(flatten)]
+    pub found: FactorReport,
 }
 
 /// Non-finite samples whose place is kept.
@@ -100,6 +124,8 @@ impl Run {
             statistics: key.statistics.then(|| Statistics::new(key.trace)),
             replicates: replicates.then(|| ReplicateSums::new(film.pixels().len())),
             film,
+            samples: plan.samples.start..plan.samples.start,
+            pilot: None,
             stopped_by: StopReason::Samples,
             rays: 0,
             paths: 0,
@@ -107,30 +133,30 @@ impl Run {
             first_non_finite: Vec::new(),
             capped_samples: 0,
             seconds: 0.0,
+            pixel_rays: Vec::new(),
+        }
+    }
+
+    /// What a pilot has cost.
+    pub(super) fn add_pilot(&mut self, pilot: &Run) {
+        self.stop(pilot.stopped_by);
+        self.rays += pilot.rays;
+        self.paths += pilot.paths;
+        if let (Some(mine), Some(its)) = (&mut self.statistics, &pilot.statistics) {
+            mine.merge(its);
         }
     }
 
     /// What a slice has brought. `origin` is the world's point at which rebased space has its zero.
-    pub(super) fn add(
-        &mut self,
-        constants: &RenderConstants,
-        outcome: &SliceOutcome,
-        slice: &SliceResults<'_>,
-        origin: DVec3,
-    ) {
-        let pixels = padded_pixels(constants);
+    pub(super) fn add(&mut self, outcome: &SliceOutcome, slice: &SliceResults<'_>, origin: DVec3) {
         if let (Some(statistics), Some(counters)) = (&mut self.statistics, slice.counters) {
             statistics.add(outcome, counters);
         }
-        for (index, result) in slice.results.iter().enumerate() {
-            if result.samples() == 0 {
-                continue;
-            }
-            let atom = u64::from(outcome.constants.first_atom) + index as u64;
-            let (x, y) = pixel_of_index(constants, atom % pixels);
+        for (index, (atom, result)) in slice.atoms.iter().zip(slice.results).enumerate() {
+            let (x, y) = atom.place();
             let sum = [0, 1, 2].map(|c| f64::from(result.sum[c]) + compensation(result, c));
-            let pixel = y as usize * constants.width as usize + x as usize;
-            let block = outcome.constants.first_block + u32::try_from(atom / pixels).unwrap_or(0);
+            let pixel = y as usize * self.film.width() as usize + x as usize;
+            let block = atom.block();
             self.film.add_block(pixel, sum, f64::from(result.luminance_squared), result.samples());
             if let (Some(film), Some(aovs)) = (&mut self.aovs, slice.aovs) {
                 film.add_block(pixel, &aov_sample(&aovs[index], origin));
@@ -140,6 +166,9 @@ impl Run {
                 replicates.add_block(pixel, block, sum, result.samples());
             }
             self.rays += u64::from(result.rays());
+            if let Some(rays) = self.pixel_rays.get_mut(pixel) {
+                *rays += u64::from(result.rays());
+            }
             self.paths += u64::from(result.samples());
             self.capped_samples += u64::from(result.capped().count_ones());
             self.non_finite_samples += u64::from(result.non_finite().count_ones());
@@ -154,6 +183,7 @@ impl Run {
 
 /// What the atoms of a slice have brought.
 pub(super) struct SliceResults<'a> {
+    pub(super) atoms: &'a [Atom],
     pub(super) results: &'a [BlockResult],
     pub(super) aovs: Option<&'a [AovSums]>,
     pub(super) counters: Option<&'a [RayCounters]>,

@@ -56,9 +56,9 @@ pub fn choose_array_form(info: &DeviceInfo, lengths: &[usize]) -> GpuResult<(Arr
     })
 }
 
-/// Whether the device binds as many storage buffers as the arrays have chunks, beside results and lane states.
+/// Whether the device binds as many storage buffers as the arrays have chunks, beside those of a slice and the view.
 pub(super) fn binds_storage(info: &DeviceInfo) -> bool {
-    info.limits.stage_storage_buffers as usize >= SCENE_ARRAYS * MAX_CHUNKS + 2
+    info.limits.stage_storage_buffers as usize >= SCENE_ARRAYS * MAX_CHUNKS + 7
 }
 
 /// The scene's buffers on a device.

@@ -1,72 +1,162 @@
-//! Which atom is rendered when: block by block, each over all pixels, in the order in which blocks are joined.
+//! Which atom is rendered when: block by block of the image's samples, each over all pixels, in the order in which blocks are
+//! joined.
 
-use crate::layout::{BLOCK_SAMPLES, RenderConstants, SliceConstants};
+use std::ops::Range;
 
-/// Hands out the atoms of a run: block by block, each over all pixels.
+use super::adaptive::SampleFactors;
+use crate::layout::{Atom, BLOCK_SAMPLES, RenderConstants};
+
+/// Hands out the atoms of a range of the image's samples.
 pub(super) struct Schedule {
-    pixels: u64,
-    first_block: u32,
-    next_atom: u64,
-    atoms: u64,
+    width: u32,
+    height: u32,
+    samples: Range<u32>,
+    /// Where it stands: the image's samples up to the end of a block, and the pixel whose atoms of them come next.
+    block: Range<u32>,
+    place: TilePlace,
+    /// The first sample of that pixel that is not handed out; `None` before its first.
+    first: Option<u32>,
 }
 
 impl Schedule {
-    pub(super) fn new(constants: &RenderConstants) -> Self {
-        let pixels = padded_pixels(constants);
-        let first_block = constants.first_sample / BLOCK_SAMPLES;
-        let blocks = constants.end_sample.div_ceil(BLOCK_SAMPLES) - first_block;
-        Self { pixels, first_block, next_atom: 0, atoms: pixels * u64::from(blocks) }
+    pub(super) fn new(constants: &RenderConstants, samples: Range<u32>) -> Self {
+        let block = block_at(samples.start, samples.end);
+        let (width, height) = (constants.width, constants.height);
+        Self { width, height, samples, block, place: TilePlace::default(), first: None }
     }
 
     pub(super) fn is_done(&self) -> bool {
-        self.next_atom >= self.atoms
+        self.block.is_empty()
     }
 
-    /// The next slice, of at most so many atoms and lanes.
-    pub(super) fn next(&mut self, atoms: u32, lanes: u32, ray_budget: u32) -> SliceConstants {
-        let atoms = atoms.min(u32::try_from(self.atoms - self.next_atom).unwrap_or(u32::MAX));
-        let constants = SliceConstants {
-            first_atom: (self.next_atom % self.pixels) as u32,
-            lanes: lanes.min(atoms),
-            atoms,
-            first_block: self.first_block + (self.next_atom / self.pixels) as u32,
-            ray_budget,
-            ..SliceConstants::default()
-        };
-        self.next_atom += u64::from(atoms);
-        constants
+    /// The next atoms, at most so many of them.
+    pub(super) fn next(&mut self, most: u32, factors: &SampleFactors) -> Vec<Atom> {
+        let mut atoms = Vec::with_capacity(most as usize);
+        while !self.is_done() {
+            let (x, y) = self.place.pixel();
+            if x < self.width && y < self.height {
+                let own = factors.own_samples(y as usize * self.width as usize + x as usize, &self.block);
+                let mut first = self.first.unwrap_or(own.start);
+                while first < own.end {
+                    if atoms.len() == most as usize {
+                        // Of a pixel that nothing is handed out of yet there is nothing to say.
+                        self.first = (first > own.start).then_some(first);
+                        return atoms;
+                    }
+                    let end = block_at(first, own.end).end;
+                    atoms.push(Atom { pixel: x | y << 16, first_sample: first, end_sample: end });
+                    first = end;
+                }
+                self.first = None;
+            }
+            if !self.place.advance(self.width, self.height) {
+                self.place = TilePlace::default();
+                self.block = block_at(self.block.end, self.samples.end);
+            }
+        }
+        atoms
+    }
+
+    /// One past the last of the image's samples that some pixel has been handed out.
+    pub(super) fn reached(&self) -> u32 {
+        let begun = self.place != TilePlace::default() || self.first.is_some();
+        if begun { self.block.end } else { self.block.start }
     }
 }
 
-/// Pixels of the film rounded up to whole 8×8 tiles.
-pub(super) fn padded_pixels(constants: &RenderConstants) -> u64 {
-    u64::from(constants.width.div_ceil(8)) * u64::from(constants.height.div_ceil(8)) * 64
+/// The samples from `first` to the end of its block, or to `end`.
+fn block_at(first: u32, end: u32) -> Range<u32> {
+    // The last block may end at sample index 2^32 − 1.
+    first..first + (BLOCK_SAMPLES - first % BLOCK_SAMPLES).min(end - first)
 }
 
-/// The pixel of an index, as `pixel_of_index` in shaders/include/lane.glsl.
-pub(super) fn pixel_of_index(constants: &RenderConstants, index: u64) -> (u32, u32) {
-    let tiles_across = u64::from(constants.width.div_ceil(8));
-    let (tile, inside) = (index / 64, index % 64);
-    let x = tile % tiles_across * 8 + inside % 8;
-    let y = tile / tiles_across * 8 + inside / 8;
-    (u32::try_from(x).unwrap_or(u32::MAX), u32::try_from(y).unwrap_or(u32::MAX))
+/// A pixel by 8×8 tiles in rows, and row by row inside a tile, so that neighbours are traced together. The last tiles reach
+/// beyond the film.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct TilePlace {
+    left: u32,
+    top: u32,
+    inside: u32,
 }
 
-/// The index of a pixel.
-pub(super) fn index_of_pixel(constants: &RenderConstants, x: u32, y: u32) -> u32 {
-    let tile = y / 8 * constants.width.div_ceil(8) + x / 8;
-    tile * 64 + y % 8 * 8 + x % 8
+impl TilePlace {
+    fn pixel(self) -> (u32, u32) {
+        (self.left + self.inside % 8, self.top + self.inside / 8)
+    }
+
+    /// To the next; false if it was the last.
+    fn advance(&mut self, width: u32, height: u32) -> bool {
+        self.inside += 1;
+        if self.inside == 64 {
+            (self.inside, self.left) = (0, self.left + 8);
+        }
+        if self.left >= width {
+            (self.left, self.top) = (0, self.top + 8);
+        }
+        self.top < height
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_pixel_has_the_index_that_it_is_found_by() {
-        let constants = RenderConstants { width: 21, height: 9, ..RenderConstants::default() };
-        for (x, y) in [(0, 0), (7, 7), (8, 0), (20, 8), (3, 8)] {
-            assert_eq!(pixel_of_index(&constants, u64::from(index_of_pixel(&constants, x, y))), (x, y));
+    const WIDTH: u32 = 21;
+    const HEIGHT: u32 = 9;
+    const PIXELS: usize = (WIDTH * HEIGHT) as usize;
+
+    /// The samples of every pixel, in the order in which they are handed out.
+    fn handed_out(samples: Range<u32>, most: u32, factors: &SampleFactors) -> Vec<Vec<u32>> {
+        let constants = RenderConstants { width: WIDTH, height: HEIGHT, ..RenderConstants::default() };
+        let mut schedule = Schedule::new(&constants, samples);
+        let mut pixels = vec![Vec::new(); PIXELS];
+        while !schedule.is_done() {
+            let atoms = schedule.next(most, factors);
+            assert!(!atoms.is_empty() && atoms.len() <= most as usize);
+            for atom in atoms {
+                let (x, y) = atom.place();
+                assert_eq!(atom.block(), (atom.end_sample - 1) / BLOCK_SAMPLES, "an atom is in one block");
+                pixels[(y * WIDTH + x) as usize].extend(atom.first_sample..atom.end_sample);
+            }
         }
+        pixels
+    }
+
+    #[test]
+    fn every_pixel_has_its_samples_in_order_however_slices_are_cut() {
+        for most in [1, 7, 1000] {
+            for samples in [0..1, 3..40, 16..32] {
+                let even = handed_out(samples.clone(), most, &SampleFactors::default());
+                assert!(even.iter().all(|pixel| pixel.iter().copied().eq(samples.clone())), "{samples:?}");
+                let factors = SampleFactors::from_log2((0..PIXELS).map(|pixel| pixel as u8 % 5).collect());
+                for (pixel, its) in handed_out(samples.clone(), most, &factors).iter().enumerate() {
+                    let factor = 1 << (pixel % 5);
+                    assert!(
+                        its.iter().copied().eq(samples.start * factor..samples.end * factor),
+                        "{samples:?} {pixel}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_last_block_ends_at_the_last_index() {
+        assert_eq!(handed_out(u32::MAX - 20..u32::MAX, 50, &SampleFactors::default())[5].len(), 20);
+    }
+
+    #[test]
+    fn it_says_how_far_it_has_come() {
+        let constants = RenderConstants { width: 8, height: 8, ..RenderConstants::default() };
+        let mut schedule = Schedule::new(&constants, 10..40);
+        assert_eq!(schedule.reached(), 10);
+        schedule.next(1, &SampleFactors::default());
+        assert_eq!(schedule.reached(), 16);
+        schedule.next(63, &SampleFactors::default());
+        assert_eq!(schedule.reached(), 16);
+        schedule.next(65, &SampleFactors::default());
+        assert_eq!((schedule.reached(), schedule.is_done()), (40, false));
+        schedule.next(100, &SampleFactors::default());
+        assert_eq!((schedule.reached(), schedule.is_done()), (40, true));
     }
 }

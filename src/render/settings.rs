@@ -7,7 +7,6 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::film::Film;
 use crate::film::aov::Aov;
 use crate::named_enum::named_enum;
 use crate::prepare::{BvhQuality, EnvironmentSampling, LightChoice};
@@ -31,6 +30,8 @@ pub struct Settings {
     pub estimate: bool,
     /// Only these sample indices, instead of `0..spp`.
     pub sample_range: Option<Range<u32>>,
+    /// Samples of a pilot, at least 2, after which noisy pixels have more samples than others (`adaptive.rs`).
+    pub adaptive: Option<u32>,
     /// Seed of the sampler.
     pub seed: u32,
     /// Scattering events a path may have: 0 shows emitters alone, 1 adds direct light. `None` is unlimited.
@@ -90,6 +91,7 @@ impl Default for Settings {
             target_error: None,
             estimate: false,
             sample_range: None,
+            adaptive: None,
             seed: 0,
             max_bounces: None,
             integrator: Integrator::default(),
@@ -129,14 +131,6 @@ impl Settings {
             LightSampling::Nee => EnvironmentSampling::Importance,
             LightSampling::Mis | LightSampling::Mixture | LightSampling::Bsdf => EnvironmentSampling::Compensated,
         })
-    }
-
-    /// The sample indices that a film rendered with these settings holds: a run that ended early has the first ones,
-    /// and its pixels may differ in how many.
-    pub fn samples_in(&self, film: &Film) -> Range<u32> {
-        let asked = self.samples();
-        let most = film.pixels().iter().map(|pixel| pixel.count).max().unwrap_or(0);
-        asked.start..asked.start.saturating_add(most).min(asked.end)
     }
 }
 
@@ -284,14 +278,5 @@ mod tests {
         assert_eq!(error, "unknown trace back end 'rtx'; there are auto, ray-query, bvh");
         assert_eq!("2".parse(), Ok(DeviceChoice::Index(2)));
         assert_eq!("H200".parse(), Ok(DeviceChoice::Name("H200".to_owned())));
-    }
-
-    #[test]
-    fn a_run_that_ended_early_holds_the_first_samples() {
-        let settings = Settings { sample_range: Some(64..128), ..Settings::default() };
-        let mut film = Film::new(1, 2);
-        assert_eq!(settings.samples_in(&film), 64..64);
-        film.add_block(1, [0.0; 3], 0.0, 16);
-        assert_eq!(settings.samples_in(&film), 64..80);
     }
 }

@@ -12,7 +12,7 @@ use super::kernel_key::KernelKey;
 use crate::Result;
 use crate::gpu::{Buffer, DeviceKind, Dispatch, Gpu, Kernel, MemoryUse, Submission};
 use crate::layout::{
-    AovSums, BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue,
+    AovSums, Atom, BLOCK_SAMPLES, BlockResult, DEBUG_RECORDS, LANE_STATE_BYTES, RayCounters, SliceConstants, SliceQueue,
 };
 
 /// Slices that are submitted before the oldest is read.
@@ -30,6 +30,8 @@ const MOST_CPU_LANES: u32 = 1 << 13;
 /// Buffers and the submission of one slice.
 pub(super) struct Slice {
     pub(super) results: Buffer,
+    /// [`Atom`]s.
+    pub(super) atoms: Buffer,
     pub(super) lane_states: Buffer,
     pub(super) queue: Buffer,
     /// [`AovSums`] an atom, if the kernel sums AOVs.
@@ -39,7 +41,7 @@ pub(super) struct Slice {
     submission: Submission,
     constants: SliceConstants,
     submitted: Instant,
-    atoms: u32,
+    most_atoms: u32,
     lanes: u32,
 }
 
@@ -62,8 +64,10 @@ impl Slice {
         };
         // Behind the result of the lane that prints there is room for what it prints.
         let results = readback("block results", atoms.max(2 + DEBUG_RECORDS), size_of::<BlockResult>())?;
+        let list = u64::from(atoms) * size_of::<Atom>() as u64;
         Ok(Self {
             results,
+            atoms: Buffer::new(gpu, "atoms", list, Usage::STORAGE_BUFFER, MemoryUse::Upload)?,
             aovs: (key.aovs != 0).then(|| readback("AOVs", atoms, size_of::<AovSums>())).transpose()?,
             counters: key.statistics.then(|| readback("counters", atoms, size_of::<RayCounters>())).transpose()?,
             lane_states: Buffer::new(
@@ -83,28 +87,33 @@ impl Slice {
             submission: Submission::new(gpu, "path_trace")?,
             constants: SliceConstants::default(),
             submitted: Instant::now(),
-            atoms,
+            most_atoms: atoms,
             lanes,
         })
     }
 
     /// Most atoms it can hold.
-    pub(super) fn atoms(&self) -> u32 {
-        self.atoms
-    }
-
-    /// Its lanes.
-    pub(super) fn lanes(&self) -> u32 {
-        self.lanes
+    pub(super) fn most_atoms(&self) -> u32 {
+        self.most_atoms
     }
 
     pub(super) fn bytes(&self) -> u64 {
         let extras = [&self.aovs, &self.counters].into_iter().flatten().map(|buffer| buffer.size).sum::<u64>();
-        self.results.size + self.lane_states.size + self.queue.size + extras
+        self.results.size + self.atoms.size + self.lane_states.size + self.queue.size + extras
     }
 
-    pub(super) fn submit(&mut self, kernel: &Kernel, set: usize, constants: SliceConstants) -> Result<()> {
-        self.constants = constants;
+    /// Renders atoms, whose number the constants then say.
+    pub(super) fn submit(
+        &mut self,
+        kernel: &Kernel,
+        set: usize,
+        atoms: &[Atom],
+        constants: SliceConstants,
+    ) -> Result<()> {
+        self.atoms.write(atoms)?;
+        let count = u32::try_from(atoms.len()).unwrap_or(u32::MAX);
+        let most_samples = atoms.iter().map(|atom| atom.end_sample - atom.first_sample).max().unwrap_or(0);
+        self.constants = SliceConstants { lanes: self.lanes.min(count), atoms: count, most_samples, ..constants };
         self.submitted = Instant::now();
         self.dispatch(kernel, set)
     }

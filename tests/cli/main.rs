@@ -1,5 +1,6 @@
 //! Tests of the program as people call it.
 
+mod adaptive;
 mod aov;
 mod bench;
 mod devices;

@@ -43,6 +43,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--samples", "8..8", "A below B"),
         ("--samples", "8", "A..B"),
         ("--seed", "x", "--seed"),
+        ("--adaptive", "1", "4..=4096"),
         ("--integrator", "photon", "path, direct, indirect, emission"),
         ("--sampler", "halton", "sobol, independent"),
         ("--light-sampling", "all", "mis, mixture, nee, bsdf"),

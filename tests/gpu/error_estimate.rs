@@ -18,14 +18,14 @@ struct Image {
 }
 
 fn plan(samples: u32, target_error: Option<f64>) -> RunPlan {
-    RunPlan { samples: 0..samples, time: None, target_error, estimate: true }
+    RunPlan { samples: 0..samples, target_error, estimate: true, ..RunPlan::default() }
 }
 
 fn render(tracer: &mut PathTracer, seed: u32, plan: &RunPlan) -> (Image, StopReason) {
     let run = tracer.run_plan(seed, plan, &mut |_| ControlFlow::Continue(())).expect("the device works");
     gpu::assert_no_validation_messages();
     let estimate = run.replicates.as_ref().and_then(|r| r.estimate()).expect("enough samples");
-    let image = Image { luminance: luminances(&run.film), estimate, samples: run.film.pixels()[0].count };
+    let image = Image { luminance: luminances(&run.film), estimate, samples: run.samples.end };
     (image, run.stopped_by)
 }
 
@@ -71,9 +71,9 @@ fn tracer(name: &str, size: u32, sampler: SamplerKind) -> PathTracer {
     gpu::path_tracer(&scene(name), &settings)
 }
 
-fn images(name: &str, seeds: u32, samples: u32, sampler: SamplerKind) -> Vec<Image> {
+fn images(name: &str, seeds: u32, plan: &RunPlan, sampler: SamplerKind) -> Vec<Image> {
     let mut tracer = tracer(name, 24, sampler);
-    (0..seeds).map(|seed| render(&mut tracer, seed, &plan(samples, None)).0).collect()
+    (0..seeds).map(|seed| render(&mut tracer, seed, plan).0).collect()
 }
 
 /// How many intervals, narrowed to a share of their width in the logarithm, hold the true error.
@@ -95,17 +95,20 @@ fn intervals_hold_the_true_error_as_often_as_they_say() {
     // Two kinds of scene: every pixel well known, and fireflies from lamps that few paths find.
     let scenes = [("cornell", 128), ("many_lights", 64)];
     let samplers = [SamplerKind::Independent, SamplerKind::Sobol];
-    for ((name, samples), sampler) in samplers.into_iter().flat_map(|s| scenes.map(|scene| (scene, s))) {
+    let even = samplers.into_iter().flat_map(|sampler| scenes.map(|(name, samples)| (name, samples, sampler, None)));
+    for (name, samples, sampler, pilot) in even.chain([("many_lights", 64, SamplerKind::Sobol, Some(8))]) {
         let seeds = 100;
-        let images = images(name, seeds, samples, sampler);
+        let images = images(name, seeds, &RunPlan { pilot, ..plan(samples, None) }, sampler);
         let errors = true_errors(&images);
         let count = covered(&images, &errors, 1.0);
         let width =
             images.iter().map(|i| i.estimate.interval[1] / i.estimate.interval[0]).sum::<f64>() / f64::from(seeds);
-        println!("{name}, {sampler}, {samples}: {count} of {seeds} intervals hold the error; they span {width:.3}");
+        println!(
+            "{name}, {sampler}, {samples}, pilot {pilot:?}: {count} of {seeds} intervals hold the error; they span {width:.3}"
+        );
         // P(X ≤ count) for the coverage that is promised: not too seldom.
         let p = 1.0 - binomial_at_least(count + 1, u64::from(seeds), CONFIDENCE);
-        assert!(p > 0.01, "{name}, {sampler}, {samples}: {count} of {seeds}, p = {p}");
+        assert!(p > 0.01, "{name}, {sampler}, {samples}, pilot {pilot:?}: {count} of {seeds}, p = {p}");
         if name == "cornell" {
             let ratios = errors.iter().zip(&images).map(|(error, image)| error / image.estimate.error);
             let mean_ratio = ratios.sum::<f64>() / f64::from(seeds);

@@ -12,7 +12,7 @@ use spirq::ReflectConfig;
 use spirq::ty::{StructType, Type};
 use spirq::var::Variable;
 use sunfleck::gpu::shader_compiler;
-use sunfleck::layout::{self, AovSums, BlockResult, RayCounters, RenderConstants, SliceConstants};
+use sunfleck::layout::{self, AovSums, Atom, BlockResult, RayCounters, RenderConstants, SliceConstants};
 
 /// Name, offset and type of a field as GLSL has it: an array on the Rust side is one field an element on the other.
 type Field = (String, usize, String);
@@ -52,6 +52,7 @@ fn split(fields: &mut Vec<Field>, name: &str, suffixes: &[&str], scalar: &str) {
 struct Blocks {
     constants: StructType,
     slice: StructType,
+    atoms: (StructType, usize),
     results: (StructType, usize),
     aovs: (StructType, usize),
     counters: (StructType, usize),
@@ -124,16 +125,17 @@ fn reflect() -> Blocks {
         counters: array_of_structs(binding(6)),
         lane_stride: array_of_structs(binding(2)).1,
         slice: only_member(push.expect("push constants")),
+        atoms: array_of_structs(binding(9)),
     }
 }
 
 fn render_constants_fields() -> Vec<Field> {
     rust_fields!(RenderConstants: camera_origin, lens_radius, camera_right, focus_distance, camera_up, projection,
-        camera_forward, vertex_texels, width, height, seed, max_bounces, first_sample, end_sample, vertices, root_slot,
+        camera_forward, vertex_texels, width, height, seed, max_bounces, light_bvh, light_bvh_counts, vertices, root_slot,
         materials, textures, lights, instances, light_cdf_word, light_count, environment_light, environment_width,
         environment_height, environment_marginal_word, environment_conditional_word, ggx_albedo, environment_radiance,
-        environment_cos, scene_center, environment_sin, light_bvh, light_bvh_counts, near_lights, clamp_indirect,
-        zero, environment_rgbe, rest_root_slot, emission_rays)
+        environment_cos, scene_center, environment_sin, near_lights, clamp_indirect,
+        zero, environment_rgbe, rest_root_slot, emission_rays, unused_0, unused_1)
 }
 
 #[test]
@@ -142,9 +144,13 @@ fn blocks_have_the_same_offsets_on_both_sides() {
     assert_eq!(shader_fields(&blocks.constants), render_constants_fields());
     assert_eq!(Type::Struct(blocks.constants).nbyte(), Some(size_of::<RenderConstants>()));
 
-    let slice = rust_fields!(SliceConstants: first_atom, lanes, first_block, ray_budget, resume, atoms, prints, unused);
+    let slice =
+        rust_fields!(SliceConstants: lanes, atoms, most_samples, ray_budget, resume, prints, unused_0, unused_1);
     assert_eq!(shader_fields(&blocks.slice), slice);
     assert_eq!(Type::Struct(blocks.slice).nbyte(), Some(size_of::<SliceConstants>()));
+
+    assert_eq!(shader_fields(&blocks.atoms.0), rust_fields!(Atom: pixel, first_sample, end_sample));
+    assert_eq!(blocks.atoms.1, size_of::<Atom>(), "stride of the atoms");
 
     let mut result = rust_fields!(BlockResult: sum, luminance_squared, compensation, rays_and_samples,
         non_finite_and_capped);

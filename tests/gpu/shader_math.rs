@@ -43,25 +43,3 @@ fn next_floats_are_neighbours() {
         assert_eq!(f32::from_bits(output[1][1]), x.next_down(), "below {x}");
     }
 }
-
-/// Whole numbers divided by floats, at multiples and beside them.
-#[test]
-fn quotients_of_whole_numbers_are_exact() {
-    let divisors =
-        (0..32).flat_map(|k| [1_u32 << k, (1_u32 << k) - u32::from(k > 0), (0xc90f_daa2_u32 >> (31 - k)) | 1]);
-    let mut inputs = Vec::new();
-    for b in divisors.filter(|b| *b <= 1 << 31) {
-        let largest = (u64::from(b) << 28).min(u64::from(u32::MAX)) as u32;
-        for i in 0..64_u32 {
-            let anywhere = (u64::from(largest) * u64::from(i) / 63) as u32;
-            let multiple = anywhere / b * b;
-            inputs.extend(
-                [multiple.saturating_sub(1), multiple, multiple.saturating_add(1), anywhere].map(|a| [0, a, b, 0]),
-            );
-        }
-    }
-    let outputs = gpu::call("math.comp", &inputs, inputs.len() as u32, 2);
-    for (&[_, a, b, _], output) in inputs.iter().zip(outputs.chunks_exact(2)) {
-        assert_eq!(output[1][2..], [a / b, a % b], "{a} / {b}");
-    }
-}
