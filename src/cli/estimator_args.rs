@@ -47,7 +47,7 @@ pub(crate) struct EstimatorArgs {
     emission_rays: Option<u32>,
     /// Adaptive sampling: a pilot of N samples per pixel, which are no part of the image, finds where it is noisy; there each
     /// sample becomes up to 32, and at most 1.25 in an average pixel. --spp, --samples and --target-error count those of the
-    /// other pixels. Unbiased, and the same for every part of a run [N: 8].
+    /// other pixels. Unbiased, and the same for every part of a run; not in watch [N: 8].
     #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "8", value_parser = clap::value_parser!(u32).range(4..=4096), help_heading = "Light transport")]
     adaptive: Option<u32>,
     /// Look up every texture in the file's own texels; without it, those of colours and roughness in mip chains, by ray

@@ -84,7 +84,7 @@ pub struct FactorReport {
 
 /// What a pilot has brought.
 pub(super) struct PilotFilm {
-    /// Its samples, at least two a pixel.
+    /// Its samples; a pixel with less than two says nothing.
     pub(super) film: Film,
     /// The rays of each pixel, which the time goes with.
     pub(super) rays: Vec<u64>,
@@ -93,12 +93,12 @@ pub(super) struct PilotFilm {
 impl PilotFilm {
     fn noise(&self) -> Vec<Noise> {
         let pixels = self.film.pixels().iter().zip(&self.rays);
-        let noise = |variance: f64, rays: u64| Noise { variance, rays: rays as f64, pixels: 1.0 };
         // What is not known, or not finite, says nothing.
-        let known = |(pixel, &rays): (&PixelSums, &u64)| {
-            pixel.variance_of_mean().filter(|v| v.is_finite()).map_or(Noise::default(), |v| noise(v, rays))
+        let noise = |(pixel, &rays): (&PixelSums, &u64)| match pixel.variance_of_mean() {
+            Some(variance) if variance.is_finite() => Noise { variance, rays: rays as f64 },
+            _ => Noise::default(),
         };
-        pixels.map(known).collect()
+        pixels.map(noise).collect()
     }
 }
 
@@ -107,18 +107,13 @@ impl PilotFilm {
 struct Noise {
     variance: f64,
     rays: f64,
-    pixels: f64,
 }
 
 impl Add for Noise {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        Self {
-            variance: self.variance + other.variance,
-            rays: self.rays + other.rays,
-            pixels: self.pixels + other.pixels,
-        }
+        Self { variance: self.variance + other.variance, rays: self.rays + other.rays }
     }
 }
 
@@ -126,12 +121,12 @@ impl Noise {
     /// The root of the variance over the rays, on a scale of powers of two; `None` without noise.
     fn level(&self) -> Option<i32> {
         let gain = self.variance / self.rays;
-        (gain > 0.0 && gain.is_finite()).then(|| (0.5 * STEPS * gain.log2()).round() as i32)
+        (gain > 0.0 && gain.is_finite()).then(|| (STEPS * gain.sqrt().log2()).round() as i32)
     }
 
     /// With so many times the samples.
     fn sampled(&self, factor: f64) -> Self {
-        Self { variance: self.variance / factor, rays: self.rays * factor, ..*self }
+        Self { variance: self.variance / factor, rays: self.rays * factor }
     }
 
     /// Variance times rays: what is least at the best use of time.

@@ -11,6 +11,7 @@ mod looks;
 mod open;
 mod other_scene;
 mod path_tracer;
+mod pilot;
 mod prints;
 mod progress;
 mod result;

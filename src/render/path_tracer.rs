@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::adaptive::{PilotFilm, SampleFactors};
+use super::adaptive::SampleFactors;
 use super::bake::BakeReport;
 use super::emission_pixels::EmissionPixels;
 use super::kernel_build::{
@@ -19,16 +19,13 @@ use super::run::{Limits, SliceResults};
 use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
-use super::{Pilot, ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
+use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
 use crate::gpu::{Gpu, Kernel, TraceBackend};
 use crate::layout::{RenderConstants, SliceConstants};
 use crate::prepare::{Prepared, camera_constants};
 use crate::scene::Camera;
 use crate::{Error, Result};
-
-/// By what bits the seeds of the two pilots differ from the image's: by no small number, as seeds of users do.
-const PILOT_SEEDS: [u32; 2] = [0x9e37_79b9, 0x6a09_e667];
 
 /// A scene on a device, ready to be rendered.
 pub struct PathTracer {
@@ -269,42 +266,8 @@ impl PathTracer {
         Ok(run)
     }
 
-    /// Finds how many samples of its own each pixel is to have for one of the image, by so many samples that are no part of
-    /// it: they have seeds of their own.
-    fn pilot(
-        &mut self,
-        run: &mut Run,
-        seed: u32,
-        samples: u32,
-        limits: &Limits,
-        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
-    ) -> Result<SampleFactors> {
-        let halves = [samples / 2, samples - samples / 2].into_iter().zip(PILOT_SEEDS);
-        let mut pilots = Vec::with_capacity(2);
-        for (samples, differs) in halves {
-            self.constants.seed = seed ^ differs;
-            let mut pilot = Run::new(&self.constants, &RunPlan::default(), &self.key);
-            pilot.pixel_rays = vec![0; pilot.film.pixels().len()];
-            let before = run.paths;
-            self.run_range(&mut pilot, 0..samples, &SampleFactors::default(), limits, &mut |update| {
-                progress(&ProgressUpdate { samples_done: before + update.samples_done, run: None, ..*update })
-            })?;
-            run.add_pilot(&pilot);
-            pilots.push(PilotFilm { film: pilot.film, rays: pilot.pixel_rays });
-        }
-        let factors = <[PilotFilm; 2]>::try_from(pilots)
-            .map_or_else(|_| SampleFactors::default(), |pilots| SampleFactors::from_pilots(&pilots));
-        run.pilot = Some(Pilot {
-            samples,
-            paths: run.paths,
-            seconds: limits.start.elapsed().as_secs_f64(),
-            found: factors.report(),
-        });
-        Ok(factors)
-    }
-
     /// Renders a range of the image's samples, and adds it to the run.
-    fn run_range(
+    pub(super) fn run_range(
         &mut self,
         run: &mut Run,
         samples: Range<u32>,

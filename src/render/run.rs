@@ -25,7 +25,8 @@ pub struct RunPlan {
     pub target_error: Option<f64>,
     /// Keep the sums of replicates, which an error estimate is made of; a target implies it.
     pub estimate: bool,
-    /// Samples of a pilot, at least 2, which finds the noisy pixels; they then have more samples of their own.
+    /// Samples of a pilot, at least 4, which finds the noisy pixels; they then have more samples of their own. Those of it
+    /// that are not finite are not counted: they are in no image.
     pub pilot: Option<u32>,
 }
 

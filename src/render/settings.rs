@@ -30,7 +30,7 @@ pub struct Settings {
     pub estimate: bool,
     /// Only these sample indices, instead of `0..spp`.
     pub sample_range: Option<Range<u32>>,
-    /// Samples of a pilot, at least 2, after which noisy pixels have more samples than others (`adaptive.rs`).
+    /// Samples of a pilot, at least 4, after which noisy pixels have more samples than others (`adaptive.rs`).
     pub adaptive: Option<u32>,
     /// Seed of the sampler.
     pub seed: u32,
