@@ -100,12 +100,12 @@ fn print_error(job: &RenderJob, result: &RenderResult) {
 fn print_pilot(result: &RenderResult) {
     let Some(pilot) = result.pilot else { return };
     let share = 100.0 * pilot.found.noisy_pixels as f64 / result.film.pixels().len().max(1) as f64;
-    eprintln!(
-        "  pilot of {} samples per pixel in {}: {share:.1} % of the pixels have up to {} times the samples",
-        pilot.samples,
-        time(pilot.seconds),
-        pilot.found.most_samples
-    );
+    let found = match pilot.found.noisy_pixels {
+        _ if !pilot.is_complete => String::from("not completed"),
+        0 => String::from("its noise is spread too evenly for more samples to pay anywhere"),
+        _ => format!("{share:.1} % of the pixels have up to {} times the samples", pilot.found.most_samples),
+    };
+    eprintln!("  pilot of {} samples per pixel in {}: {found}", pilot.samples, time(pilot.seconds));
 }
 
 /// What the run did, in a few lines on standard error.

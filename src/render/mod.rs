@@ -131,6 +131,11 @@ pub fn render_on(
         warnings
             .push(String::from("a counter stopped at 4294967295 within a block of 16 samples: there were more visits"));
     }
+    if run.pilot.is_some_and(|pilot| !pilot.is_complete) && run.stopped_by != StopReason::Interrupted {
+        warnings.push(String::from(
+            "--adaptive: a quarter of the time was up before its pilot was complete; all pixels are sampled alike",
+        ));
+    }
     let error_estimate = run.replicates.as_ref().and_then(ReplicateSums::estimate);
     if run.replicates.is_some() && error_estimate.is_none() {
         warnings.push(String::from(

@@ -95,6 +95,8 @@ pub struct Run {
 pub struct Pilot {
     /// Its samples of every pixel; none of them is in the image.
     pub samples: u32,
+    /// False if it took too much of the run's time, or was interrupted: then it found nothing.
+    pub is_complete: bool,
     /// Its paths.
     pub paths: u64,
     /// Its wall time.
@@ -140,7 +142,10 @@ impl Run {
 
     /// What a pilot has cost.
     pub(super) fn add_pilot(&mut self, pilot: &Run) {
-        self.stop(pilot.stopped_by);
+        // Its time is a part of the run's.
+        if pilot.stopped_by != StopReason::Time {
+            self.stop(pilot.stopped_by);
+        }
         self.rays += pilot.rays;
         self.paths += pilot.paths;
         if let (Some(mine), Some(its)) = (&mut self.statistics, &pilot.statistics) {

@@ -1,10 +1,11 @@
 //! Adaptive sampling: noisy pixels have more samples, the mean stays, and the parts of a run are those of the whole.
 
 use std::ops::{ControlFlow, Range};
+use std::time::Duration;
 
 use glam::DVec3;
 use sunfleck::film::Film;
-use sunfleck::render::{BindingOverride, PathTracer, Run, RunPlan, SamplerKind, Settings};
+use sunfleck::render::{BindingOverride, PathTracer, Run, RunPlan, SamplerKind, Settings, StopReason};
 use sunfleck::scene::{Bsdf, Environment, Material, Scene};
 
 use crate::common::builder::{camera, rectangle, scene};
@@ -127,4 +128,27 @@ fn even_noise_is_sampled_evenly() {
     let pilot = with.pilot.expect("asked for");
     assert_eq!((pilot.found.noisy_pixels, pilot.found.most_samples, pilot.found.mean_samples), (0, 1, 1.0));
     assert!(bits(&with.film) == bits(&run(&mut tracer, 1, 0..20, None).film));
+}
+
+/// A pilot that has not ended decides nothing, and an interrupted one renders no image.
+#[test]
+fn a_pilot_that_does_not_end_decides_nothing() {
+    let mut tracer = gpu::path_tracer(&lamp_in_a_mirror(), &settings());
+    let plan = RunPlan { samples: 0..u32::MAX, pilot: Some(4096), ..RunPlan::default() };
+    let in_time = RunPlan { time: Some(Duration::from_millis(200)), ..plan.clone() };
+    let mut limits = Vec::new();
+    let run = tracer.run_plan(1, &in_time, &mut |update| {
+        limits.push(update.time_limit);
+        ControlFlow::Continue(())
+    });
+    let run = run.expect("the device works");
+    let pilot = run.pilot.expect("it began");
+    assert_eq!((pilot.is_complete, pilot.found.noisy_pixels, run.stopped_by), (false, 0, StopReason::Time));
+    assert!(pilot.seconds < run.seconds && run.film.pixels().iter().any(|pixel| pixel.count > 0), "{pilot:?}");
+    assert!(limits.iter().all(|&limit| limit == in_time.time));
+
+    let run = tracer.run_plan(1, &plan, &mut |_| ControlFlow::Break(())).expect("the device works");
+    assert_eq!((run.stopped_by, run.samples), (StopReason::Interrupted, 0..0));
+    assert!(run.film.pixels().iter().all(|pixel| pixel.count == 0));
+    gpu::assert_no_validation_messages();
 }
