@@ -16,6 +16,16 @@ pub use sunfleck::shader_test::chi_square::{ChiSquare, chi_square_test};
 /// lamp that fills the tile) equal although their variance is zero.
 const ROUNDING: f64 = 1e-6;
 
+/// Σ over pixels and images of the squared distance of red from its mean over the images.
+pub fn squared_deviations(images: &[Vec<[f32; 3]>]) -> f64 {
+    let pixel = |p: usize| {
+        let values: Vec<f64> = images.iter().map(|image| f64::from(image[p][0])).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
+    };
+    (0..images[0].len()).map(pixel).sum()
+}
+
 /// ln Γ(x) for x > 0, by Lanczos' approximation (g = 7, 9 terms); relative error about 1e-15.
 pub fn ln_gamma(x: f64) -> f64 {
     const COEFFICIENTS: [f64; 9] = [

@@ -11,7 +11,7 @@ use sunfleck::scene::{Bsdf, Environment, Material, Scene};
 use crate::common::builder::{camera, rectangle, scene};
 use crate::common::gpu;
 use crate::common::scenes::slow_driver;
-use crate::common::statistics::{TileStatistics, assert_agree};
+use crate::common::statistics::{TileStatistics, assert_agree, squared_deviations};
 
 const PILOT: u32 = 8;
 
@@ -75,13 +75,8 @@ fn noise_goes_where_it_is_found() {
     let mut variance_and_rays = |pilot| {
         let runs: Vec<Run> = (0..24).map(|seed| run(&mut tracer, seed, 0..64, pilot)).collect();
         let images: Vec<_> = runs.iter().map(|run| run.film.radiance()).collect();
-        let pixel = |p: usize| {
-            let values: Vec<f64> = images.iter().map(|image| f64::from(image[p][0])).collect();
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
-        };
         let rays = runs.iter().map(|run| run.rays).sum::<u64>() as f64;
-        ((0..50 * 37).map(pixel).sum::<f64>(), rays, runs[0].pilot)
+        (squared_deviations(&images), rays, runs[0].pilot)
     };
     let (even, even_rays, _) = variance_and_rays(None);
     let (adaptive, rays, pilot) = variance_and_rays(Some(PILOT));

@@ -5,7 +5,7 @@ use sunfleck::render::{Integrator, SamplerKind, Settings};
 use sunfleck::scene::{AlphaMode, Bsdf, Environment, Instance, Material, Projection, Scene};
 
 use crate::common::builder::{camera, rectangle, scene};
-use crate::common::statistics::{Estimate, assert_agree};
+use crate::common::statistics::{Estimate, assert_agree, squared_deviations};
 use crate::common::{gpu, scenes};
 
 /// Lamps before a grey sky: one in the middle behind a sheet that is half there, one behind a post, a mirrored instance that
@@ -97,12 +97,7 @@ fn lamps_have_smoother_edges() {
         };
         let mut tracer = gpu::path_tracer(&scenes::scene("cornell"), &settings);
         let images: Vec<_> = (0..8).map(|seed| gpu::run(&mut tracer, seed, 16).film.radiance()).collect();
-        let pixel = |p: usize| {
-            let values: Vec<f64> = images.iter().map(|image| f64::from(image[p][0])).collect();
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
-        };
-        (0..64 * 64).map(pixel).sum::<f64>()
+        squared_deviations(&images)
     };
     let (without, chosen, eight) = (error(Some(0)), error(None), error(Some(8)));
     println!("{without:.3e}, {chosen:.3e}, {eight:.3e}: {:.4}", eight / without);
