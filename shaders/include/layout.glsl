@@ -125,8 +125,6 @@ struct SliceConstants {
     uint ray_budget;
     uint resume;
     uint prints;
-    uint unused_0;
-    uint unused_1;
 };
 
 struct Atom {

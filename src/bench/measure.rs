@@ -11,8 +11,8 @@ use super::plan::{Budget, Plan, ReferenceChoice};
 use super::point::{Point, SeedRun, mse_over};
 use super::power_law::PowerLaw;
 use super::reference::{Reference, ReferenceInfo};
-use super::work::{Progress, Work};
-use crate::render::{OpenDevice, PathTracer, Seconds, Settings, path_tracer_on};
+use super::work::Work;
+use crate::render::{OpenDevice, PathTracer, Progress, Seconds, Settings, path_tracer_on};
 use crate::scene::Scene;
 use crate::{Error, Result};
 

@@ -1,14 +1,10 @@
 //! Renders the images of a bench one after the other, and reports their progress as that of the whole.
 
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::plan::Budget;
-use crate::render::{PathTracer, ProgressUpdate, Run, RunPlan, StopReason};
+use crate::render::{PathTracer, Progress, ProgressUpdate, Run, RunPlan, StopReason};
 use crate::{Error, Result};
-
-/// Called after every slice; says whether to go on.
-pub(super) type Progress<'a> = &'a mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>;
 
 /// Counts what is done.
 pub(super) struct Work<'a> {

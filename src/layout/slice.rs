@@ -18,10 +18,6 @@ pub struct SliceConstants {
     pub resume: u32,
     /// 1 if the only lane writes what it prints behind its result (shaders/include/debug.glsl).
     pub prints: u32,
-    /// Unused, zero.
-    pub unused_0: u32,
-    /// Unused, zero.
-    pub unused_1: u32,
 }
 
 /// What a lane renders at a time: sample indices of one pixel, all in one block of [`BLOCK_SAMPLES`].

@@ -22,7 +22,6 @@ mod settings;
 mod slices;
 mod statistics;
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 pub use adaptive::FactorReport;
@@ -35,7 +34,7 @@ pub use open::{OpenDevice, choose_trace, open_device};
 pub use other_scene::OtherScene;
 pub use path_tracer::PathTracer;
 pub use prints::Printed;
-pub use progress::ProgressUpdate;
+pub use progress::{Progress, ProgressUpdate};
 pub use result::{NonFiniteSample, RenderResult, Seconds, StopReason};
 pub use run::{Pilot, Run, RunPlan};
 pub use scene_buffers::{SceneBuffers, choose_array_form};
@@ -80,11 +79,7 @@ pub fn prepare_scene_again(scene: &Scene, camera: &Camera, settings: &Settings, 
 ///
 /// # Errors
 /// No usable device, and those of [`render_on`].
-pub fn render(
-    scene: &Scene,
-    settings: &Settings,
-    progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
-) -> Result<RenderResult> {
+pub fn render(scene: &Scene, settings: &Settings, progress: Progress<'_>) -> Result<RenderResult> {
     render_on(&open_device(settings)?, scene, settings, progress)
 }
 
@@ -115,7 +110,7 @@ pub fn render_on(
     open: &OpenDevice,
     scene: &Scene,
     settings: &Settings,
-    progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+    progress: Progress<'_>,
 ) -> Result<RenderResult> {
     let (mut tracer, camera, prepare_seconds) = path_tracer_on(open, scene, settings)?;
     let run = tracer.run_plan(settings.seed, &RunPlan::new(settings), progress)?;

@@ -1,7 +1,7 @@
 //! The path-tracing kernel for one scene on one device: built once, run for any seed and range of samples.
 
 use std::collections::VecDeque;
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -19,7 +19,7 @@ use super::run::{Limits, SliceResults};
 use super::scene_buffers::{SceneBuffers, choose_array_form};
 use super::schedule::Schedule;
 use super::slices::{SLICES_IN_FLIGHT, Slice, SliceSizes};
-use super::{ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
+use super::{Progress, ProgressUpdate, Run, RunPlan, SamplerKind, Settings, StopReason};
 use crate::film::replicates::ReplicateSums;
 use crate::gpu::{Gpu, Kernel, TraceBackend};
 use crate::layout::{RenderConstants, SliceConstants};
@@ -210,7 +210,7 @@ impl PathTracer {
         seed: u32,
         samples: Range<u32>,
         time: Option<Duration>,
-        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+        progress: Progress<'_>,
     ) -> Result<Run> {
         let plan = RunPlan { samples, time, ..RunPlan::default() };
         self.run_plan(seed, &plan, progress)
@@ -221,12 +221,7 @@ impl PathTracer {
     /// # Errors
     /// When the device is lost, or the plan asks for an error that the tracer's samples cannot give: those of the Sobol'
     /// sampler are replicates only if its settings had asked for the error too.
-    pub fn run_plan(
-        &mut self,
-        seed: u32,
-        plan: &RunPlan,
-        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
-    ) -> Result<Run> {
+    pub fn run_plan(&mut self, seed: u32, plan: &RunPlan, progress: Progress<'_>) -> Result<Run> {
         if plan.estimates_error() && self.key.sampler != SamplerKind::Independent && !self.key.replicates {
             return Err(Error::Usage(String::from("the path tracer was not built to estimate its error")));
         }
@@ -273,7 +268,7 @@ impl PathTracer {
         samples: Range<u32>,
         factors: &SampleFactors,
         limits: &Limits,
-        progress: &mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>,
+        progress: Progress<'_>,
     ) -> Result<()> {
         self.view.constants.write(&[self.constants])?;
         self.sizes.begin(samples.end - samples.start);

@@ -2,11 +2,9 @@
 //!
 //! It may take [`TIME_SHARE`] of a run's time. If that is up before, all pixels are sampled alike.
 
-use std::ops::ControlFlow;
-
 use super::adaptive::{PilotFilm, SampleFactors};
 use super::run::Limits;
-use super::{PathTracer, Pilot, ProgressUpdate, Run, RunPlan, StopReason};
+use super::{PathTracer, Pilot, Progress, ProgressUpdate, Run, RunPlan, StopReason};
 use crate::Result;
 
 /// By what bits the seeds of its halves differ from the image's: by no small number, as seeds of users do.
@@ -14,9 +12,6 @@ const SEEDS: [u32; 2] = [0x9e37_79b9, 0x6a09_e667];
 
 /// Of the time that a run has, the pilot's is one over this.
 const TIME_SHARE: u32 = 4;
-
-/// Called after every slice; says whether to go on.
-type Progress<'a> = &'a mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>;
 
 impl PathTracer {
     /// Finds how many samples of its own each pixel is to have for one of the image, by so many that are no part of it.

@@ -1,14 +1,18 @@
 //! What a running render tells its caller.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use super::Run;
 
-/// The state of a render, given to the caller's closure after every slice. The closure answers with
-/// [`std::ops::ControlFlow::Break`] to stop: the render then returns what it has, as [`super::StopReason::Interrupted`].
+/// Called after every slice; says whether to go on.
+pub type Progress<'a> = &'a mut dyn FnMut(&ProgressUpdate) -> ControlFlow<()>;
+
+/// The state of a render, given to the caller's [`Progress`]. That answers with
+/// [`ControlFlow::Break`] to stop: the render then returns what it has, as [`super::StopReason::Interrupted`].
 #[derive(Clone, Copy, Debug)]
 pub struct ProgressUpdate<'a> {
-    /// Samples done so far, over all pixels.
+    /// Samples done so far, over all pixels, those of a pilot too.
     pub samples_done: u64,
     /// Samples to do, over all pixels; `None` if only time or an error ends the render.
     pub samples_total: Option<u64>,

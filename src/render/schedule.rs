@@ -32,29 +32,33 @@ impl Schedule {
     /// The next atoms, at most so many of them.
     pub(super) fn next(&mut self, most: u32, factors: &SampleFactors) -> Vec<Atom> {
         let mut atoms = Vec::with_capacity(most as usize);
-        while !self.is_done() {
-            let (x, y) = self.place.pixel();
-            if x < self.width && y < self.height {
-                let own = factors.own_samples(y as usize * self.width as usize + x as usize, &self.block);
-                let mut first = self.first.unwrap_or(own.start);
-                while first < own.end {
-                    if atoms.len() == most as usize {
-                        // Of a pixel that nothing is handed out of yet there is nothing to say.
-                        self.first = (first > own.start).then_some(first);
-                        return atoms;
-                    }
-                    let end = block_at(first, own.end).end;
-                    atoms.push(Atom { pixel: x | y << 16, first_sample: first, end_sample: end });
-                    first = end;
-                }
-                self.first = None;
-            }
+        while !self.is_done() && self.hand_out_pixel(&mut atoms, most as usize, factors) {
             if !self.place.advance(self.width, self.height) {
                 self.place = TilePlace::default();
                 self.block = block_at(self.block.end, self.samples.end);
             }
         }
         atoms
+    }
+
+    /// The atoms of the pixel's samples in the block; false if not all of them have room.
+    fn hand_out_pixel(&mut self, atoms: &mut Vec<Atom>, most: usize, factors: &SampleFactors) -> bool {
+        let (x, y) = self.place.pixel();
+        if x >= self.width || y >= self.height {
+            return true;
+        }
+        let own = factors.own_samples(y as usize * self.width as usize + x as usize, &self.block);
+        let mut first = self.first.take().unwrap_or(own.start);
+        while first < own.end {
+            if atoms.len() == most {
+                self.first = (first > own.start).then_some(first);
+                return false;
+            }
+            let end = block_at(first, own.end).end;
+            atoms.push(Atom { pixel: x | y << 16, first_sample: first, end_sample: end });
+            first = end;
+        }
+        true
     }
 
     /// One past the last of the image's samples that some pixel has been handed out.

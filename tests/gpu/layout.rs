@@ -144,8 +144,7 @@ fn blocks_have_the_same_offsets_on_both_sides() {
     assert_eq!(shader_fields(&blocks.constants), render_constants_fields());
     assert_eq!(Type::Struct(blocks.constants).nbyte(), Some(size_of::<RenderConstants>()));
 
-    let slice =
-        rust_fields!(SliceConstants: lanes, atoms, most_samples, ray_budget, resume, prints, unused_0, unused_1);
+    let slice = rust_fields!(SliceConstants: lanes, atoms, most_samples, ray_budget, resume, prints);
     assert_eq!(shader_fields(&blocks.slice), slice);
     assert_eq!(Type::Struct(blocks.slice).nbyte(), Some(size_of::<SliceConstants>()));
 
